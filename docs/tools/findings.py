@@ -8,6 +8,7 @@ A test compares the pages with the catalogue.
 from collections.abc import Iterator
 from pathlib import Path
 
+from kinertia.diagnostics.limits import with_limits
 from kinertia.findings.display import outlined
 from kinertia.findings.rule import FAMILIES, Rule, all_rules, family_title, matching, page, questions, rules
 
@@ -81,7 +82,7 @@ def _family(family: str) -> str:
     for question, asked in questions(family).items():
         parts.append(f"## {question} {asked} {{ #{question.lower()} }}")
         for code in matching(question):
-            parts += _rule(rules(family)[code])
+            parts += _rule(with_limits(rules(family)[code]))
     return "\n\n".join(parts) + "\n"
 
 

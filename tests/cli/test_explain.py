@@ -5,6 +5,7 @@ import json
 import pytest
 
 from command_line import run
+from kinertia.diagnostics.limits import with_limits
 from kinertia.findings.rule import all_rules, matching, rule
 
 
@@ -17,7 +18,7 @@ def told(*arguments):
 @pytest.mark.parametrize("code", ["P213", "p213", " P213 "])
 def test_a_code_is_explained_in_full(code):
     text = told(code)
-    one = rule("P213")
+    one = with_limits(rule("P213"))
     for part in (one.code, one.name, one.severity, one.escalation, one.detects, one.effect, *one.causes, one.remedy):
         assert part in text
     assert "The zero of <plate> is off: it reads <level>" in text

@@ -114,13 +114,13 @@ def test_a_question_without_meaning_is_not_asked():
         return [OTHER_ZERO]
 
     wrong_axis = finding("P201", Where(trial="walk"))
-    assert asked([Check("P21", ask, unless=("P20",))], "walk", [wrong_axis]) == []
-    assert asked([Check("P21", ask, unless=("P24",))], "walk", [wrong_axis]) == [OTHER_ZERO]
+    assert asked([Check(("P21",), ask, unless=("P20",))], "walk", [wrong_axis]) == []
+    assert asked([Check(("P21",), ask, unless=("P24",))], "walk", [wrong_axis]) == [OTHER_ZERO]
     assert calls == ["walk"]
 
 
 def test_findings_without_a_trial_are_of_the_one_asked():
-    (found,) = asked([Check("P21", lambda _: [finding("P211", drift_n=Quantity(1.0, "N"))])], None, (), "walk")
+    (found,) = asked([Check(("P21",), lambda _: [finding("P211", drift_n=Quantity(1.0, "N"))])], None, (), "walk")
     assert found.where.trial == "walk"
 
 

@@ -9,6 +9,7 @@ import typer
 
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out
+from kinertia.diagnostics.limits import with_limits
 from kinertia.errors import SettingsError
 from kinertia.findings.display import outlined
 from kinertia.findings.rule import Rule, all_rules, family_title, matching, nearest, page, rule
@@ -33,7 +34,7 @@ def explain(
     kinertia explain P21
     """
     wanted = code.strip().upper()
-    found = [rule(one) for one in matching(wanted)]
+    found = [with_limits(rule(one)) for one in matching(wanted)]
     if not found:
         raise SettingsError(_unknown(code))
     if len(wanted) == 4:

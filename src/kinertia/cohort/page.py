@@ -14,6 +14,7 @@ import numpy as np
 
 from kinertia.cohort.instruments import COLUMNS, drift
 from kinertia.cohort.record import AGAINST
+from kinertia.diagnostics.limits import with_limits
 from kinertia.estimation.cycles import UNITS, Kind
 from kinertia.io.results.output_folder import write_then_rename
 from kinertia.model.bsp import PARAMETERS
@@ -288,7 +289,7 @@ def overruled_in_vain(people: pd.DataFrame, findings: pd.DataFrame) -> list[str]
 
 
 def _meaning(code: str) -> Markup:
-    one = rule(code)
+    one = with_limits(rule(code))
     texts = (code, code, one.name.replace("-", " "), one.detects, outlined(one.effect), outlined(one.remedy))
     return Markup('<strong id="explain-{}">{} {}</strong>: {} {} {}').format(*texts)
 

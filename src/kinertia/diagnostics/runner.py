@@ -1,16 +1,19 @@
 """Runs checks, lets causes explain their consequences, and applies what the user overrules.
 
-A check returns all findings that apply, or fits every hypothesis and returns the best. Only the relation
-`supersedes` of the catalogue hides findings, whatever their order. The order of checks matters to `unless` only: a
-check is left out where earlier ones found that it is meaningless, so it comes after those that it names.
+A check declares itself beside its function: `@check("P245", unless=..., off_plate=OFF_PLATE)`. It returns all findings
+that apply, or fits every hypothesis and returns the best. It is left out where a check that runs before it found that
+it is meaningless (`unless`): the order of checks follows from that, not from their place in a list. Only the relation
+`supersedes` of the catalogue hides findings, whatever their order.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import Any, Generic, TypeVar
 
 from kinertia.findings.extensions import RULES, loaded, names
 from kinertia.findings.finding import Finding, Severity
+from kinertia.findings.limit import Limit
 from kinertia.findings.rule import FAMILIES, matching, rule
 from kinertia.findings.where import Where
 from kinertia.settings import Overrule
@@ -18,52 +21,87 @@ from kinertia.settings import Overrule
 Context = TypeVar("Context")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Check(Generic[Context]):
-    """One check of a recording, person or result: a question, answered by one function.
+    """One check of a recording, person or result, called like the function that it was declared with.
 
     Attributes:
-        code: first three characters of its codes, "P21".
-        ask: function that answers it.
-        unless: codes, questions or families, of earlier questions, whose ERROR makes it meaningless: then it is not
-            asked.
+        codes: codes of its findings; of other packages the first three characters.
+        ask: function that returns the findings.
+        unless: codes, or beginnings of codes, of other checks, whose ERROR makes it meaningless: then it does not run.
+        limits: its limits, by the names that texts of the catalogue have for them.
     """
 
-    code: str
+    codes: tuple[str, ...]
     ask: Callable[[Context], Iterable[Finding]]
     unless: tuple[str, ...] = ()
+    limits: Mapping[str, Limit] = field(default_factory=dict)
+
+    def __call__(self, context: Context) -> Iterable[Finding]:
+        """Return the findings about this context."""
+        return self.ask(context)
+
+    def needs(self, other: "Check[Any]") -> bool:
+        """Return whether it has to run after another, whose ERROR may make it meaningless."""
+        return other is not self and any(code.startswith(self.unless) for code in other.codes)
+
+
+def check(
+    *codes: str, unless: tuple[str, ...] = (), **limits: Limit
+) -> Callable[[Callable[[Context], Iterable[Finding]]], Check[Context]]:
+    """Declare a function as a check that reports these codes; arguments as in `Check`."""
+    return lambda ask: Check(codes, ask, unless, limits)
 
 
 def asked(
-    checks: Iterable[Check[Context]], context: Context, found: Sequence[Finding] = (), trial: str | None = None
+    checks: Sequence[Check[Context]], context: Context, found: Sequence[Finding] = (), trial: str | None = None
 ) -> list[Finding]:
     """Run these checks, except those that earlier findings make meaningless, and return the findings.
 
     Args:
-        checks: in the order in which they run.
+        checks: in any order.
         context: what they are asked of.
         found: earlier findings.
         trial: name of the trial for findings that state none.
     """
     result: list[Finding] = []
-    for check in checks:
-        errors = {one.code for one in (*found, *result) if one.severity is Severity.ERROR}
-        if any(code.startswith(unless) for code in errors for unless in check.unless):
+    for one in in_order(tuple(checks)):
+        errors = {each.code for each in (*found, *result) if each.severity is Severity.ERROR}
+        if any(code.startswith(one.unless) for code in errors):
             continue
-        for one in check.ask(context):
-            result.append(one if trial is None or one.where.trial is not None else one.in_trial(trial))
+        for each in one(context):
+            result.append(each if trial is None or each.where.trial is not None else each.in_trial(trial))
     return result
+
+
+@cache
+def in_order(checks: tuple[Check[Any], ...]) -> tuple[Check[Any], ...]:
+    """Return the checks so that each comes after those that may make it meaningless, else in the order given.
+
+    Raises:
+        ValueError: checks need one another in a circle.
+    """
+    left, result = list(checks), []
+    while left:
+        first = next((one for one in left if not any(one.needs(other) for other in left)), None)
+        if first is None:
+            raise ValueError(f"checks need one another: {', '.join('/'.join(one.codes) for one in left)}")
+        left.remove(first)
+        result.append(first)
+    return tuple(result)
 
 
 def added_checks() -> tuple[Check[Any], ...]:
     """Return the checks of recordings that installed packages add."""
     families = [one for one in names(RULES) if one not in FAMILIES]
-    return tuple(Check(code, ask) for one in families for code, ask in loaded(RULES, one).recording_questions.items())
+    return tuple(
+        Check((code,), ask) for one in families for code, ask in loaded(RULES, one).recording_questions.items()
+    )
 
 
 def rules_of(*checks: Check[Any]) -> int:
     """Count the rules that these checks cover."""
-    return len({code for one in checks for code in matching(one.code)})
+    return len({each for one in checks for code in one.codes for each in matching(code)})
 
 
 def explained(findings: Iterable[Finding], left_out: Collection[str] = ()) -> list[Finding]:

@@ -22,7 +22,7 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.motion.inverse_kinematics import InverseKinematics
 from kinertia.trial.data import Trial
 
-_BACKWARDS_RAD = 0.05
+BACKWARDS_RAD = 0.05
 """Least angle beyond the end of the elbow's range, median over the frames."""
 _STRIDE_RAD = float(np.radians(30.0))
 """Half of what a knee bends in the swing phase of walking."""
@@ -46,7 +46,7 @@ def with_elbows_that_bend_forwards(
     beyond = {name[-1]: _beyond(skeleton, poses, name) for name in ELBOWS}
     if not any(each.any() for each in beyond.values()):
         return skeleton, poses
-    sides = [side for side, each in beyond.items() if each.size and np.median(each) < -_BACKWARDS_RAD]
+    sides = [side for side, each in beyond.items() if each.size and np.median(each) < -BACKWARDS_RAD]
     if sides:
         free = first_poses(loose.free(ARM_ROTATIONS), trials)
         turns = {name: _mean_angle(free, name) for name in ARM_ROTATIONS if name[-1] in sides}

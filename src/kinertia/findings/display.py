@@ -56,6 +56,20 @@ def shown(quantity: Quantity, style: str = "") -> str:
     return f"{', '.join(texts)} {unit}".rstrip()
 
 
+def exact(value: float | tuple[float, ...], unit: str, style: str = "") -> str:
+    """Format a limit, or a range, with up to three digits: "7.5 mm", "0.79 to 0.84"; `style` as in `shown`.
+
+    >>> exact(0.0075, "m"), exact(0.05, "1", "%"), exact((-0.025, 0.025), "s"), exact(5000.0, "kg/m3")
+    ('7.5 mm', '5 %', '-25 to 25 ms', '5000 kg/m3')
+    """
+    values = value if isinstance(value, tuple) else (value,)
+    factor, name, _ = _scaled(unit, max(abs(one) for one in values))
+    if style == "%":
+        factor, name = 100.0, "%"
+    texts = (f"{factor * one:{'.0f' if abs(factor * one) >= 1000.0 else '.3g'}}" for one in values)
+    return f"{' to '.join(texts)} {name}".rstrip()
+
+
 def first_few(names: Sequence[str], most: int = _LISTED) -> str:
     """List the first names, and how many more there are."""
     more = len(names) - most

@@ -17,7 +17,7 @@ FloatArray = npt.NDArray[np.float64]
 
 LIMITS_N = (100.0, 200.0, 100.0)
 """Smallest spikes, along X, Y and Z. Smaller ones have no effect on joint moments."""
-_WINDOW_S, _LONGEST_S = 0.004, 0.002
+_WINDOW_S, LONGEST_S = 0.004, 0.002
 _STEP_BESIDE, _STEPS = 0.15, 2
 """Share of a spike by which the force may change in each of the samples before and after it. In the hardest landings,
 too, it rises and falls over several samples."""
@@ -63,7 +63,7 @@ def without_spikes(
     for first, last in runs(np.asarray((beyond > 1.0).any(axis=1))):
         axis = int(np.argmax(beyond[first : last + 1].max(axis=0)))
         here = force[max(first - 1 - _STEPS, 0) : last + 2 + _STEPS, axis]
-        if last - first + 1 > max(1, around * _LONGEST_S / _WINDOW_S) or len(here) < last - first + 3 + 2 * _STEPS:
+        if last - first + 1 > max(1, around * LONGEST_S / _WINDOW_S) or len(here) < last - first + 3 + 2 * _STEPS:
             continue
         inside = here[_STEPS : len(here) - _STEPS]
         size = inside - np.linspace(inside[0], inside[-1], len(inside))

@@ -9,7 +9,7 @@ from kinertia.trial.sampled_time import runs
 
 STANDING_RANGE_M = 0.03
 """In a standing trial the median marker stays within this (5th to 95th percentile)."""
-_LEAST_WALK_M = 0.5
+LEAST_WALK_M = 0.5
 """Least distance that counts as net travel."""
 UPRIGHT_SHARE = 0.7
 STILL_M_S = 0.1
@@ -134,7 +134,7 @@ def travel(markers: Markers) -> Travel:
     velocity = np.median(way[long] / took[long, None], axis=0)
     speed = float(np.hypot(velocity[0], velocity[2]))
     distance = float(speed * np.ptp(markers.time[shown.any(axis=1)]))
-    if distance < _LEAST_WALK_M:
+    if distance < LEAST_WALK_M:
         return Travel("no net travel", distance, 0.0, np.nan)
     return Travel("walks", distance, speed, float(np.degrees(np.arctan2(-velocity[2], velocity[0]))))
 

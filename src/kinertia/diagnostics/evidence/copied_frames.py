@@ -8,10 +8,11 @@ from typing import Self
 
 import numpy as np
 
+from kinertia.findings.limit import Limit
 from kinertia.trial.data import BoolArray, FloatArray, Markers
 from kinertia.trial.sampled_time import runs
 
-COPIED_SHARE = 0.25
+COPIED_SHARE = Limit(0.25)
 """Share of copies beyond which the recording was upsampled: at half the rate, each repeated once, half are copies."""
 FEWEST_FRAMES = 11
 LEAST_MOTION_M = 1e-3

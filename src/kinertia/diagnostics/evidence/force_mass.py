@@ -1,6 +1,7 @@
 """Weighs a body by forces, before inverse kinematics: on the move, standing, and on each plate.
 
 Over a window the mean vertical force is m (g + dv / T), where dv is the change of the body centre's upward velocity
+from kinertia.findings.limit import Limit
 from its beginning to its end. The body's centre is marker-based: each segment has its usual share of body mass. No
 model is fitted; the centre's velocity is wrong by about 0.1 m/s, and by less where the body moves at the end as at the
 beginning: over whole strides and steps, and in standing.
@@ -15,6 +16,7 @@ import numpy as np
 from kinertia.diagnostics.evidence.body_centre import body_centre
 from kinertia.diagnostics.evidence.plate_edges import OVERHANG_M, beyond_edges
 from kinertia.diagnostics.evidence.strides import periods
+from kinertia.findings.limit import Limit
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.motion.smoothing import MIN_SAMPLES, SmoothingError, smooth
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N
@@ -32,14 +34,14 @@ _FAST_HZ, _SLOW_HZ = 8.0, 4.0
 _AROUND_S = 0.25
 """Frames this near the window help to know velocities at its ends."""
 _FEWEST_FRAMES = 2 * MIN_SAMPLES
-_COMPLETE, MISSING = 0.15, 0.25
+_COMPLETE, MISSING = 0.15, Limit(0.25)
 """Share of body weight within which all of it is supported, and from which on some of it is not."""
-UNMEASURED_S = 0.2
+UNMEASURED_S = Limit(0.2, "s", usual=(0.0, 0.06))
 """Part of the weight that is missing for this long is on something else, whatever the mean: in fault-free walks, runs
 and jumps it is missing for 0.06 s at most, in flight."""
-_MOSTLY = 0.25
+MOSTLY = Limit(0.25)
 """Share of the window in which all must be supported for the rest to be called an unmeasured contact."""
-FOREIGN_SHARE, _FOREIGN_S = 0.3, 0.15
+FOREIGN_SHARE, FOREIGN_S = Limit(0.3), Limit(0.15, "s", usual=(0.0, 0.09))
 """Share of body weight that plates bear in addition, and its duration, from which on it is another person's: in 29
 walks it is beyond 0.3 for no sample, in landings, of which markers smooth the impact, for up to 0.09 s."""
 _WINDOW_S, _STILL_M = 0.2, 0.005
@@ -50,9 +52,10 @@ _BETWEEN, _ASIDE_M = (0.15, 0.85), 0.15
 """Range between the feet of the load of both: beyond it, one of them also stands on something else."""
 _CENTRE_HZ = 8.0
 _ALONE_N, _UNLOADED_N, _SHORTEST_S = 50.0, 10.0, 0.2
-_ADULT_N = 70.0 * GRAVITY_M_S2
+ADULT_KG = Limit(70.0, "kg")
+_ADULT_N = ADULT_KG * GRAVITY_M_S2
 _HEAVIEST_PERCENT = 95.0
-STEP_N, _FEWEST = 350.0, 10
+STEP_N, _FEWEST = Limit(350.0, "N"), 10
 """Half the weight of an adult, which no bump has; so many samples under load, at least."""
 
 
@@ -95,7 +98,7 @@ class ForceMass:
         share = self.supported_kg / total_kg - 1.0
         complete = float((np.abs(share) < _COMPLETE).mean())
         spans = [(a, b) for a, b in runs(share < -MISSING) if span_s(self.time, a, b) >= UNMEASURED_S]
-        if complete < _MOSTLY or not spans:
+        if complete < MOSTLY or not spans:
             return None
         first, last = max(spans, key=lambda span: span[1] - span[0])
         span = float(self.time[first]), float(self.time[last])
@@ -104,8 +107,8 @@ class ForceMass:
     def foreign(self, total_kg: float) -> ForeignLoad | None:
         """Find the longest time in which plates bear much more than the person, though at other times they do not."""
         share = self.supported_kg / total_kg - 1.0
-        spans = [(a, b) for a, b in runs(share > FOREIGN_SHARE) if span_s(self.time, a, b) >= _FOREIGN_S]
-        if float((np.abs(share) < _COMPLETE).mean()) < _MOSTLY or not spans:
+        spans = [(a, b) for a, b in runs(share > FOREIGN_SHARE) if span_s(self.time, a, b) >= FOREIGN_S]
+        if float((np.abs(share) < _COMPLETE).mean()) < MOSTLY or not spans:
             return None
         first, last = max(spans, key=lambda span: span[1] - span[0])
         span = float(self.time[first]), float(self.time[last])

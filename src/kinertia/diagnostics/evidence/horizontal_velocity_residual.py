@@ -7,6 +7,7 @@ from typing import Self
 import numpy as np
 
 from kinertia.diagnostics.evidence.horizontal_velocity import ForceVelocity, joined_without_trend
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import FloatArray
 
@@ -17,7 +18,7 @@ DISTINGUISHABLE = 0.5
 trials what is true leaves 0.1 to 0.66 of what the other would, in one walk 0.7 to 1.7."""
 MOST_ZERO_N = 25.0
 """Plates whose zeros are wrong by more show it while they are unloaded."""
-CLEARLY_BEST = 0.85
+CLEARLY_BEST = Limit(0.85)
 """A fault is identified where undoing it leaves less than this share of what undoing any other leaves."""
 
 

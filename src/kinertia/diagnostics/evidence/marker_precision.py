@@ -9,10 +9,11 @@ from typing import Self
 
 import numpy as np
 
+from kinertia.findings.limit import Limit
 from kinertia.trial.data import FloatArray, Markers
 
-COARSE_M, USUAL_ROUNDING_M = 0.0015, (0.0, 8e-5)
-NOISY_M, USUAL_NOISE_M = 0.0025, (1e-4, 1e-3)
+COARSE_M = Limit(0.0015, "m", usual=(0.0, 8e-5))
+NOISY_M = Limit(0.0025, "m", usual=(1e-4, 1e-3))
 USUAL_HZ = 60.0
 """At lower rates accelerations look like noise: they grow with the square of the frame interval, their changes with its
 third power."""

@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory
+from kinertia.findings.limit import Limit
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
 from kinertia.trial.foot_motion import AROUND_LOAD_S
@@ -14,7 +15,7 @@ from kinertia.trial.sampled_time import TIME_TOLERANCE_S, runs, span_s
 
 COP_MIN_FORCE_N = 5 * LOAD_THRESHOLD_N
 CONTACT_FORCE_N, SHORTEST_S = 50.0, 0.15
-FAR_M = 0.15
+FAR_M = Limit(0.15, "m")
 """A load that is farther from both feet than this, for half of it, is under neither."""
 ONE_STEP_S = 1.5
 """Longest load of a single step; longer ones are of both feet, in turn (walking on one belt) or at once (squats)."""

@@ -6,10 +6,11 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from kinertia.diagnostics.evidence.plate_contacts import FAR_M, PlateContact
+from kinertia.findings.limit import Limit
 from kinertia.trial.data import BoolArray, FloatArray, Markers, PlateLoads
 from kinertia.trial.sampled_time import within
 
-OVERHANG_M, HALLUX_M = 0.01, 0.02
+OVERHANG_M, HALLUX_M = Limit(0.01, "m"), Limit(0.02, "m")
 """Distance of markers from the skin; and uncertainty of the position of a big toe without a marker."""
 LITTLE_BEYOND_M = 0.03
 """Overhang of a heel that bears no notable load."""
@@ -20,7 +21,8 @@ _LIFTED_M = 0.01
 weight is missing 0.1 s later."""
 _PRESSED_M = 0.05
 """A foot presses on the ground up to this far from its centre of pressure."""
-_NO_FOOT_M, _FOOT_M, _GAP_M, _FIRM = 0.015, 0.035, 0.01, 0.25
+NO_FOOT_M = Limit(0.015, "m", usual=(0.034, np.inf))
+_FOOT_M, _GAP_M, _FIRM = 0.035, 0.01, 0.25
 """With the whole foot on a plate, the centre of pressure stays farther from the plate's edge than the first, and as a
 rule farther than the second: on 27 plates, 34 mm and more while the load is above a quarter of its largest. With toes
 beyond the edge it comes to 27 mm and nearer. Plates side by side are less than the third apart."""
@@ -113,7 +115,7 @@ def _by_pressure(contact: PlateContact, corners: FloatArray) -> list[Overhang]:
     """Find an overhang that no marker shows, from a centre of pressure nearer to the edge than a whole foot allows."""
     firm = contact.weight > _FIRM * contact.weight.max()
     beyond = beyond_edges(corners[contact.plate], contact.place)[firm]
-    if np.median(beyond) >= 0.0 or beyond.max() < -_NO_FOOT_M:
+    if np.median(beyond) >= 0.0 or beyond.max() < -NO_FOOT_M:
         return []
     angles = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
     ring = np.stack([np.cos(angles), np.sin(angles)], axis=1)
@@ -125,7 +127,7 @@ def _by_pressure(contact: PlateContact, corners: FloatArray) -> list[Overhang]:
         result: BoolArray = (outside > _GAP_M).any(axis=1)
         return result
 
-    if not (near(_NO_FOOT_M) & firm).any():
+    if not (near(NO_FOOT_M) & firm).any():
         return []
     unmeasured = near(_PRESSED_M)
     start, end = float(contact.time[unmeasured][0]), float(contact.time[unmeasured][-1])
@@ -134,7 +136,7 @@ def _by_pressure(contact: PlateContact, corners: FloatArray) -> list[Overhang]:
         start = min([start, *(first for first, _ in stances)])
     if unmeasured[-1]:
         end = max([end, *(last for _, last in stances)])
-    nearest = next(d for d in np.arange(0.001, _NO_FOOT_M + 0.001, 0.001) if (near(float(d)) & firm).any())
+    nearest = next(d for d in np.arange(0.001, NO_FOOT_M + 0.001, 0.001) if (near(float(d)) & firm).any())
     return [Overhang(contact.plate, contact.foot, _FOOT_M - float(nearest), (start, end), (start, end))]
 
 

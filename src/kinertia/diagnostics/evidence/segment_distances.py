@@ -11,13 +11,14 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from kinertia.findings.limit import Limit
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import FloatArray, Markers
 
 LOWER_BODY = ("pelvis", *(f"{name}_{side}" for name in ("thigh", "shank", "foot") for side in "rl"))
 FEWEST_PAIRS = 6
 """Fewer pairs are not representative of a whole body."""
-SAME_SESSION_M = 0.009
+SAME_SESSION_M = Limit(0.009, "m", usual=(0.0, 0.0046))
 """RMS difference of the distances: re-applied markers are displaced by 5 to 10 mm along each axis, which makes 7 to
 14."""
 _FRAMES = 60

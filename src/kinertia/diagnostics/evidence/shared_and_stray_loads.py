@@ -9,20 +9,21 @@ import numpy as np
 from kinertia.diagnostics.evidence.contact_fit import Feet
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory
 from kinertia.diagnostics.evidence.plate_contacts import BETWEEN_M, FAR_M, ONE_STEP_S, PlateContact
+from kinertia.findings.limit import Limit
 from kinertia.model.marker_set import MarkerSet
 from kinertia.motion.kinematics import FEWEST_FRAMES
 from kinertia.trial.data import FEET, BoolArray, PlateLoads, Trial
 from kinertia.trial.sampled_time import runs, span_s, within
 
-_OUTSIDE_M, _OUTSIDE_SHARE = 0.14, 0.01
+OUTSIDE_M, _OUTSIDE_SHARE = Limit(0.14, "m"), 0.01
 _MOSTLY = 0.5
-_OTHERS_SHARE = 0.25
+OTHERS_SHARE = Limit(0.25)
 """The centre of pressure divides the line between both feet as they share the load. At foot off of feet without a toe
 marker it is up to 0.19 of the way to the other foot, which stands on the floor."""
 FOOT_ENDS = (("heel",), ("metatarsal", "toe"))
 _LEAST_LENGTH_M = 0.08
 """Less than from heel to forefoot of a child of four years."""
-STRAY_M = 0.3
+STRAY_M = Limit(0.3, "m", usual=(0.0, 0.04))
 """A load that is farther from both feet than this is not a step of the person: no recording without faults has one."""
 _SEEN = 0.5
 
@@ -91,8 +92,8 @@ def _under_both(contact: PlateContact) -> BoolArray:
     away &= opposite
     # on a treadmill's single belt the feet come in turn, and each sample is sorted (`plate_assignment`)
     if span_s(contact.time) <= ONE_STEP_S:
-        away |= own > _OUTSIDE_M
-    away &= own > _OTHERS_SHARE * (own + other)
+        away |= own > OUTSIDE_M
+    away &= own > OTHERS_SHARE * (own + other)
     return away
 
 

@@ -12,22 +12,23 @@ from typing import Self
 import numpy as np
 
 from kinertia.diagnostics.evidence.marker_precision import USUAL_HZ
+from kinertia.findings.limit import Limit
 from kinertia.trial.data import BoolArray, FloatArray, Markers
 from kinertia.trial.sampled_time import runs
 
-BODY_M, SPIKE_M = 0.02, 0.06
-"""Off the middle of its neighbours: a body's accelerations account for less than the one at 60 Hz, a spike for as much
-more as the other."""
-STEP_M, USUAL_STEP_M = 0.04, (0.0, 0.012)
-STRAIGHT_M = 1.5e-4
+BODY_M = 0.02
+SPIKE_M = Limit(0.08, "m", usual=(0.0, BODY_M))
+"""Off the middle of its neighbours: a body's accelerations account for less than the former at 60 Hz."""
+STEP_M = Limit(0.04, "m", usual=(0.0, 0.012))
+STRAIGHT_M = Limit(1.5e-4, "m")
 """Nothing alive moves so straight, at a constant speed, for `STRAIGHT_S`; cameras err by more."""
-STRAIGHT_S = 0.15
+STRAIGHT_S = Limit(0.15, "s")
 OFF_M = 0.015
 """Change of a marker's distances in its segment while it is frozen or moves straight, and the segment does not."""
 _SINGLE = 1.5
 """A single displaced frame is displaced by twice as much as its neighbours seem to be; one before or after a jump, by
 the same."""
-_BRIEF_S = 0.06
+BRIEF_S = Limit(0.06, "s")
 """Steps to and from a displaced position belong to one spike if they are within this; anything longer is a jump."""
 _FROZEN_M = 1e-3
 
@@ -112,13 +113,13 @@ class TrajectoryFaults:
         return frozenset(one.label for one in found)
 
 
-MOST_SPIKES = 2
+MOST_SPIKES = Limit(2)
 """Number of far frames of one marker up to which they may be an accident of labelling."""
 
 
 def spike_limit_m(rate_hz: float) -> float:
     """Return the distance (m) from the neighbours' middle beyond which a frame is a spike; 80 mm from 60 Hz up."""
-    return SPIKE_M + BODY_M * slowness(rate_hz)
+    return SPIKE_M + BODY_M * (slowness(rate_hz) - 1.0)
 
 
 def step_limit_m(rate_hz: float) -> float:
@@ -185,7 +186,7 @@ def _frames_off(place: FloatArray, frame: int, rate_hz: float) -> tuple[int, int
     None where the step stays.
     """
     limit_m = step_limit_m(rate_hz) / 2
-    for count in range(1, max(2, round(_BRIEF_S * rate_hz)) + 1):
+    for count in range(1, max(2, round(BRIEF_S * rate_hz)) + 1):
         for first in range(frame + 1 - count, frame + 2):
             a, b = first - 1, first + count
             if a < 1 or b > len(place) - 2:

@@ -10,9 +10,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.landmarks import CLEAR, cosine, horizontal, most_forwards, unit
+from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.model.marker_set import MarkerSet, in_words
 from kinertia.trial.data import FloatArray
@@ -21,7 +24,7 @@ _UP = np.array([0.0, 1.0, 0.0])
 _OPPOSED = 0.2
 """Cosine; the sides of a pelvis are up to 70 degrees apart, those of one with a side reversed 110 or more."""
 _BELOW_M = 0.05
-_BEHIND, _BEYOND, _USUAL_SHARE = -0.1, 1.1, (0.22, 0.48)
+_BEHIND, _BEYOND = Limit(-0.1, usual=(0.22, 0.48)), Limit(1.1)
 """Position of an ankle as a share of the distance from heel to toes; from 12 people."""
 _BENT = 0.35
 """Sine of 20 degrees: beyond it, an elbow's bend is clear."""
@@ -56,6 +59,7 @@ class _Body:
         return with_evidence(code, self.context.at(markers=tuple(dict.fromkeys(labels))), evidence)
 
 
+@check("L201", "L202", "L203", "L205", "L206", "L207", "L208", unless=needs.AXES, behind=_BEHIND, beyond=_BEYOND)
 def anatomy(context: RecordingContext) -> Iterator[Finding]:
     """Report L201 to L208: labels that contradict a person's anatomy, of a person upright, standing or moving, with Y
     up."""
@@ -226,7 +230,7 @@ def _ankles(body: _Body) -> Iterator[Finding]:
             (heel, _BEHIND, "behind the heel") if share <= _BEHIND else (toe, _BEYOND, "beyond the toes")
         )
         yield body.found(
-            "L207", ankle, other, share=Quantity(share, "1", limit=limit, usual=_USUAL_SHARE), place=Quantity(where)
+            "L207", ankle, other, share=Quantity(share, "1", limit=limit, usual=_BEHIND.usual), place=Quantity(where)
         )
 
 
@@ -292,6 +296,7 @@ def _other_way_round(body: _Body, joint: str, names: tuple[str, ...] | list[str]
     return body.found("L208", *names, cosine=Quantity(outwards, "1", limit=-CLEAR), joint=Quantity(in_words(joint)))
 
 
+@check("L106")
 def heading(context: RecordingContext) -> Iterator[Finding]:
     """Report L106: the sides of the pelvis are absent, or never visible together."""
     if context.marker_set is None or not context.marker_set.landmarks:
@@ -308,6 +313,7 @@ def heading(context: RecordingContext) -> Iterator[Finding]:
     )
 
 
+@check("S311", unless=(*needs.AXES, "L20"))
 def direction_of_travel(context: RecordingContext) -> Iterator[Finding]:
     """Report S311: the person walks where neither feet nor pelvis point.
 

@@ -4,8 +4,10 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.runner import check
 from kinertia.errors import KinertiaError, MarkerSetError
 from kinertia.findings.finding import Finding, Severity, finding
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.model.assumptions import assumptions
 from kinertia.model.gait27 import build_gait27
@@ -18,13 +20,29 @@ from kinertia.model.joint_centres import (
     pelvis_frame,
     wand_rotation,
 )
-from kinertia.model.leg_axes import departures
+from kinertia.model.leg_axes import ANKLE, FOOT, KNEE, departures
 from kinertia.model.marker_set import in_words, nearest_labels, with_nearest
 
 _USUAL_HEIGHT_M, _ANY_SEX = 1.7, "male"
 """Whether landmarks suffice depends on neither."""
 
 
+@check(
+    "L105",
+    "L107",
+    "L108",
+    "S206",
+    "S209",
+    unless=("L106", "M104"),
+    knee=Limit(WAND_LIMITS["knee"].limit_rad, "rad", usual=(0.0, WAND_LIMITS["knee"].usual_rad)),
+    ankle=Limit(WAND_LIMITS["ankle"].limit_rad, "rad", usual=(0.0, WAND_LIMITS["ankle"].usual_rad)),
+    knee_axis=Limit(KNEE.within, "rad", usual=(0.0, KNEE.usual)),
+    ankle_axis=Limit(ANKLE.within, "rad", usual=(0.0, ANKLE.usual)),
+    ankle_from=Limit(ANKLE.centre, "rad"),
+    ankle_apart=Limit(ANKLE.apart, "rad"),
+    foot=Limit(FOOT.within, "rad", usual=(0.0, FOOT.usual)),
+    foot_from=Limit(FOOT.centre, "rad"),
+)
 def landmarks(context: RecordingContext) -> Iterator[Finding]:
     """Report why no model can be built from a static trial (L105, S206), or each missing part that a model can do
     without (L107), wands that are not used (L108) and axes that no person has (S209).

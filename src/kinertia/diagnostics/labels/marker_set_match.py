@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.io.marker_set_file import nearest_preset
@@ -53,6 +54,7 @@ def match_labels(labels: Sequence[str], marker_set: MarkerSet | None) -> tuple[M
     ), used
 
 
+@check("L101", "L102", "L103")
 def labels_match(context: RecordingContext) -> Iterator[Finding]:
     """Report L101 to L103: no marker set fits, labels are missing, or labels are spelled differently (one finding
     each)."""

@@ -14,14 +14,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, finding, with_evidence
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.model.marker_set import MarkerSet, in_words
 from kinertia.trial.data import FloatArray, Markers
 
-_SEGMENT_M, _JOINT_M, _USUAL_M = 0.06, 0.10, (0.0, 0.04)
-"""Limits within a segment, if a marker moves with another; of landmarks on both sides of a joint; usual range."""
+_SEGMENT_M, _JOINT_M = Limit(0.06, "m", usual=(0.0, 0.04)), Limit(0.10, "m")
+"""Within a segment, if a marker moves with another; of landmarks on both sides of a joint."""
 _ELSEWHERE = 0.35
 """Change of the distances to the markers of the segment with which a marker goes, over that to those of its own."""
 _OWN_WAY = ("torso", "head", "upper_arm", "forearm", "hand")
@@ -51,6 +54,7 @@ class _Pair(NamedTuple):
     limit_m: float
 
 
+@check("L213", "L214", unless=needs.LENGTH_UNIT, segment=_SEGMENT_M, joint=_JOINT_M)
 def rigidity(context: RecordingContext) -> Iterator[Finding]:
     """Report L213, one per marker that does not move with its segment; L214, one per segment on the wrong leg.
 
@@ -83,7 +87,7 @@ def _not_rigid(context: RecordingContext, markers: Markers, marker_set: MarkerSe
         if worst.change_m < in_any_case and not any(_elsewhere(markers, marker_set, one) for one in involved):
             continue
         evidence = {
-            "change_m": Quantity(worst.change_m, "m", limit=worst.limit_m, usual=_USUAL_M),
+            "change_m": Quantity(worst.change_m, "m", limit=worst.limit_m, usual=_SEGMENT_M.usual),
             "segment": Quantity(in_words(worst.joined)),
         }
         better = _better(markers, marker_set, odd, worst.change_m)

@@ -9,10 +9,13 @@ from itertools import combinations
 
 import numpy as np
 
+from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.trajectory_faults import step_limit_m, steps
+from kinertia.diagnostics.runner import check
 from kinertia.estimation.calibration import sampled
 from kinertia.findings.finding import Finding, finding
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.gait27 import ARM_ROTATIONS, ELBOWS
@@ -31,7 +34,7 @@ _MOST_SUSPECTS = 8
 _RESOLVED_SHARE = 0.55
 """Two labels were swapped if swapping them back brings their errors below this share of what they were."""
 _FEWEST_TO_TURN = 2
-_LOST_M = 0.08
+LOST_M = Limit(0.08, "m")
 """The static model fits the trial not at all if it misses the markers by more than this (root mean square)."""
 
 
@@ -75,9 +78,9 @@ def labels_by_model(skeleton: Skeleton, trial: Trial | Recording) -> Iterator[Fi
             method=Quantity("model fit"),
             reference=Quantity("static trial"),
         )
-    elif overall > _LOST_M:
+    elif overall > LOST_M:
         worst = ", ".join(labels[k] for k in np.argsort(-plain)[:3])
-        yield finding("R106", where, rms_m=Quantity(overall, "m", limit=_LOST_M), worst=Quantity(worst))
+        yield finding("R106", where, rms_m=Quantity(overall, "m", limit=LOST_M), worst=Quantity(worst))
 
 
 def _complete_frames(skeleton: Skeleton, name: str, markers: Markers) -> tuple[Skeleton, Markers, np.ndarray] | Finding:
@@ -137,6 +140,7 @@ _NEAR_M = 0.04
 """Largest distance of each marker from the other's position one frame before."""
 
 
+@check("L211", unless=needs.LENGTH_UNIT + needs.MEASURED_FRAMES)
 def label_swaps(context: RecordingContext) -> Iterator[Finding]:
     """Report L211: one finding per swap; where labels return to their own markers there is another."""
     markers = context.measured_markers

@@ -10,22 +10,25 @@ import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.landmarks import feet_to_pelvis_m
+from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, finding, with_evidence
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import FloatArray
 from kinertia.trial.marker_quality import UPRIGHT_SHARE, extent_m
 from kinertia.trial.sampled_time import runs, span_s
 
-_SMALLEST_M, _LARGEST_M = 0.3, 2.8
+_SMALLEST_M, _LARGEST_M = Limit(0.3, "m"), Limit(2.8, "m")
 _UPRIGHT = 0.5
 """Cosine of 60 degrees: a sitting person has the pelvis partly beside the feet."""
 _STILL_M_S, _SHORTEST_S = 0.15, 0.08
 _LONGEST_M, _FEWEST_PLACES = 1.0, 3
-_TILTED_RAD, _STEEP_RAD, _OFF_LINE_M = np.radians(0.8), np.radians(10.0), 0.006
+_TILTED_RAD = Limit(np.radians(0.8), "rad", usual=(-np.radians(0.1), np.radians(0.1)))
+_STEEP_RAD, _OFF_LINE_M = Limit(np.radians(10.0), "rad"), 0.006
 """Steeper are stairs, and jumps from a box."""
-_USUAL_RAD = (-np.radians(0.1), np.radians(0.1))
 
 
+@check("M141", "M142", smallest=_SMALLEST_M, largest=_LARGEST_M)
 def unit_and_vertical(context: RecordingContext) -> Iterator[Finding]:
     """Report M141 and M142: wrong unit of length, or vertical axis by the markers' extent or the line from feet to
     pelvis."""
@@ -56,6 +59,7 @@ def unit_and_vertical(context: RecordingContext) -> Iterator[Finding]:
     yield with_evidence("M142", context.at(), evidence)
 
 
+@check("M144", unless=("M141", "M142"), tilted=_TILTED_RAD, steep=_STEEP_RAD)
 def floor_slope(context: RecordingContext) -> Iterator[Finding]:
     """Report M144: a floor that rises (positive) or falls along the walk; not tested on a treadmill."""
     if context.feet is None or context.recording.belt is not None:
@@ -87,7 +91,7 @@ def floor_slope(context: RecordingContext) -> Iterator[Finding]:
     yield finding(
         "M144",
         context.at(**context.along(context.axes.fore_aft)),
-        slope_rad=Quantity(slope, "rad", limit=_TILTED_RAD, usual=_USUAL_RAD),
+        slope_rad=Quantity(slope, "rad", limit=_TILTED_RAD, usual=_TILTED_RAD.usual),
         residual_m=Quantity(residual, "m", limit=_OFF_LINE_M),
         length_m=Quantity(float(np.ptp(along)), "m"),
     )

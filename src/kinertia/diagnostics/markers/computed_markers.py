@@ -12,14 +12,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, Severity, finding
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import FloatArray, Recording
 
-_EXACT_M, _SKIN_M = 1e-4, 3e-4
+_EXACT_M, _SKIN_M = Limit(1e-4, "m"), 3e-4
 """Skin moves by more than the latter; where pelvis markers do not, they are computed themselves, or on one plate."""
 _DISTANCE_M = 2.0 * _EXACT_M
 """SD of a point's distance from an origin above which it is exact in no axes there: that SD is at most the square root
@@ -40,6 +43,7 @@ class _Computed(NamedTuple):
     sd_m: float
 
 
+@check("M151", unless=needs.LENGTH_UNIT, exact=_EXACT_M)
 def computed_markers(context: RecordingContext) -> Iterator[Finding]:
     """Report M151, one per point that was computed from other markers; of a motion."""
     if context.marker_set is not None:

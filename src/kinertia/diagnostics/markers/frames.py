@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.copied_frames import (
     COPIED_SHARE,
@@ -18,30 +19,45 @@ from kinertia.diagnostics.evidence.copied_frames import (
     without_copied_frames,
 )
 from kinertia.diagnostics.evidence.trajectory_faults import slowness, steps
+from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, Severity, finding
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import BoolArray, FloatArray, Markers
 from kinertia.trial.sampled_time import runs
 
-_MISSING_M, _MISSING_TIMES, _USUAL_STEP_M = 0.006, 3.0, (0.0, 0.0015)
+_MISSING_M, _MISSING_TIMES = Limit(0.006, "m", usual=(0.0, 0.0015)), Limit(3.0)
 """Step of the median marker where frames are missing: at least this distance, and this multiple of its usual step.
 Noisy cameras move all markers, in every frame."""
-_FEW_COPIED = 0.05
+_FEW_COPIED = Limit(0.05)
 """Share of the frames up to which copies of dropped frames are treated as gaps (`without_copied_frames`)."""
-_INTERPOLATED_SHARE, _STRAIGHT = 0.4, 0.03
+_INTERPOLATED_SHARE, _STRAIGHT = Limit(0.4), 0.03
 """Of three frames drawn between two measured ones all lie in the middle between their neighbours: they bend by less
 than this share of how much the quick frames bend."""
 
-_LEAST_RATE_HZ, _USUAL_RATE_HZ = 45.0, (60.0, 250.0)
+_LEAST_RATE_HZ = Limit(45.0, "Hz", usual=(60.0, 250.0))
 """With frames of five walks left out, joint moments changed by .1 to .9 SDs at 50 Hz, but for one (3.1), and by up to
 3.8 SDs at 30 Hz."""
 
 
+@check(
+    "M121",
+    "M122",
+    "M123",
+    "M124",
+    unless=needs.LENGTH_UNIT,
+    step=_MISSING_M,
+    times=_MISSING_TIMES,
+    few=_FEW_COPIED,
+    copied=COPIED_SHARE,
+    interpolated=_INTERPOLATED_SHARE,
+    rate=_LEAST_RATE_HZ,
+)
 def frames(context: RecordingContext) -> Iterator[Finding]:
     """Report M121 to M124: missing frames (one finding per cut), copied frames, interpolated frames, too few frames."""
     markers = context.markers
     if markers.rate_hz < _LEAST_RATE_HZ:
-        rate = Quantity(markers.rate_hz, "Hz", limit=_LEAST_RATE_HZ, usual=_USUAL_RATE_HZ)
+        rate = Quantity(markers.rate_hz, "Hz", limit=_LEAST_RATE_HZ, usual=_LEAST_RATE_HZ.usual)
         yield finding("M124", context.at(), rate_hz=rate)
     if len(markers.time) < FEWEST_FRAMES:
         return
@@ -107,7 +123,7 @@ def _missing(context: RecordingContext) -> Iterator[Finding]:
         yield finding(
             "M121",
             context.at(span_s=span),
-            step_m=Quantity(float(step[cut]), "m", limit=limit, usual=_USUAL_STEP_M),
+            step_m=Quantity(float(step[cut]), "m", limit=limit, usual=_MISSING_M.usual),
             frames=Quantity(float(_frames_lost(markers, cut)), "1"),
             time_s=Quantity(span[1], "s"),
         )

@@ -12,23 +12,27 @@ from itertools import combinations
 
 import numpy as np
 
+from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.body_centre import bridged_trajectory
+from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, finding
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import Markers
 
-_QUICK_HZ, _LEAST_SHARE, _USUAL_SHARE, _LEAST_SWING_M_S = 4.0, 0.002, (0.008, 0.06), 1.0
-_CERTAIN_SHARE, _QUICK_OF_STANCE = 0.0013, 3.1
+_QUICK_HZ, _LEAST_SHARE, _LEAST_SWING_M_S = Limit(4.0, "Hz"), Limit(0.002, usual=(0.008, 0.06)), 1.0
+_CERTAIN_SHARE, _QUICK_OF_STANCE = Limit(0.0013), 3.1
 """Share that no fault-free motion has, of 30 (0.008 and more): after a filter at 3 Hz it is 0.0002 to 0.0012. Who
 stands longer also swings more slowly: the limit of quick motion in Hz is at most the latter over the stance in s."""
-_MOST_RATIO, _USUAL_RATIO, _RATIO_OF_A_RATE = 1.15, (0.8, 1.05), 1.8
+_MOST_RATIO, _RATIO_OF_A_RATE = Limit(1.15, usual=(0.8, 1.05)), 1.8
 _RIGID_M = 0.0115
 """Distances between markers of a shank change by up to 10 mm (median over pairs, 2 to 98 %). A filter shortens whatever
 turns quickly; a wrong rate does not."""
 _MOSTLY_SEEN = 0.9
 
 
+@check("M133", unless=needs.VELOCITY, quick=_QUICK_HZ, share=_LEAST_SHARE, certain=_CERTAIN_SHARE, ratio=_MOST_RATIO)
 def over_smoothed(context: RecordingContext) -> Iterator[Finding]:
     """Report M133: markers without the fast part of the motion that the forces show; no finding without steps."""
     trial, owners, changes = context.trial, context.segment_of_label, context.velocity_changes
@@ -43,8 +47,8 @@ def over_smoothed(context: RecordingContext) -> Iterator[Finding]:
         yield finding(
             "M133",
             context.at(),
-            share=Quantity(share, "1", limit=_LEAST_SHARE, usual=_USUAL_SHARE),
-            velocity_ratio=Quantity(ratio, "1", limit=_MOST_RATIO, usual=_USUAL_RATIO),
+            share=Quantity(share, "1", limit=_LEAST_SHARE, usual=_LEAST_SHARE.usual),
+            velocity_ratio=Quantity(ratio, "1", limit=_MOST_RATIO, usual=_MOST_RATIO.usual),
         )
 
 

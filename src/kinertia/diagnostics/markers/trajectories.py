@@ -4,17 +4,23 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.marker_precision import COARSE_M, USUAL_NOISE_M, USUAL_ROUNDING_M
+from kinertia.diagnostics.evidence.marker_precision import COARSE_M, NOISY_M
 from kinertia.diagnostics.evidence.trajectory_faults import (
-    BODY_M,
+    BRIEF_S,
     MOST_SPIKES,
     OFF_M,
-    USUAL_STEP_M,
+    SPIKE_M,
+    STEP_M,
+    STRAIGHT_M,
+    STRAIGHT_S,
     spike_limit_m,
     step_limit_m,
 )
+from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, Severity, finding
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.model.marker_set import in_words
 from kinertia.motion.kinematics import LONGEST_BRIDGE_S
@@ -22,13 +28,29 @@ from kinertia.trial.data import Markers
 from kinertia.trial.marker_quality import visibility
 from kinertia.trial.sampled_time import windows
 
-_COINCIDING_M, _COINCIDING_S, _MOSTLY = 0.003, 0.1, 0.5
+_COINCIDING_M, _COINCIDING_S, _MOSTLY = Limit(0.003, "m"), Limit(0.1, "s"), 0.5
 """The centres of two markers are at least a diameter apart: 4 mm for the smallest."""
-_RARE = 0.5
+_RARE = Limit(0.5)
 _DISPENSABLE = ("upper_arm", "forearm")
 """Arms need not be seen."""
 
 
+@check(
+    "M111",
+    "M112",
+    "M113",
+    "M114",
+    "M115",
+    unless=needs.LENGTH_UNIT + needs.MEASURED_FRAMES,
+    spike=SPIKE_M,
+    brief=BRIEF_S,
+    frames=MOST_SPIKES,
+    step=STEP_M,
+    straight=STRAIGHT_M,
+    straight_for=STRAIGHT_S,
+    coinciding=_COINCIDING_M,
+    coinciding_for=_COINCIDING_S,
+)
 def trajectories(context: RecordingContext) -> Iterator[Finding]:
     """Report M111 to M115: faults of single trajectories, one finding per marker with spikes, per jump and per filled
     gap; and labels of one and the same marker.
@@ -40,7 +62,7 @@ def trajectories(context: RecordingContext) -> Iterator[Finding]:
             "M111",
             context.at(markers=(spikes.label,), span_s=spikes.span_s),
             Severity.ERROR if spikes.far_frames > MOST_SPIKES else None,
-            distance_m=Quantity(spikes.distance_m, "m", limit=spike_limit_m(rate_hz), usual=(0.0, BODY_M)),
+            distance_m=Quantity(spikes.distance_m, "m", limit=spike_limit_m(rate_hz), usual=SPIKE_M.usual),
             frames=Quantity(float(spikes.frames), "1"),
             first_s=Quantity(spikes.span_s[0], "s"),
         )
@@ -48,7 +70,7 @@ def trajectories(context: RecordingContext) -> Iterator[Finding]:
         yield finding(
             "M112",
             context.at(markers=(jump.label,), span_s=jump.span_s),
-            step_m=Quantity(jump.step_m, "m", limit=step_limit_m(rate_hz), usual=USUAL_STEP_M),
+            step_m=Quantity(jump.step_m, "m", limit=step_limit_m(rate_hz), usual=STEP_M.usual),
             time_s=Quantity(jump.span_s[1], "s"),
         )
     for filled in faults.filled:
@@ -83,6 +105,7 @@ def _coinciding(context: RecordingContext) -> Iterator[Finding]:
                 )
 
 
+@check("M101", "M102", "M103", "M104", rare=_RARE, gap=Limit(LONGEST_BRIDGE_S, "s"))
 def visible(context: RecordingContext) -> Iterator[Finding]:
     """Report M101 to M104: one finding per marker (M102 and M103 over the measured window), M104 one per bare
     segment."""
@@ -125,12 +148,13 @@ def _bare_segments(context: RecordingContext) -> Iterator[Finding]:
             yield finding("M104", context.at(part=in_words(segment)), expected=count, labels=Quantity(expected))
 
 
+@check("M131", "M132", unless=needs.LENGTH_UNIT + needs.MEASURED_FRAMES, coarse=COARSE_M, noisy=NOISY_M)
 def precision(context: RecordingContext) -> Iterator[Finding]:
     """Report M131 and M132: coarsely rounded coordinates, and noisy ones."""
     precise = context.marker_precision
     if precise.rounded:
-        step = Quantity(precise.step_m, "m", limit=COARSE_M, usual=USUAL_ROUNDING_M)
+        step = Quantity(precise.step_m, "m", limit=COARSE_M, usual=COARSE_M.usual)
         yield finding("M131", context.at(), step_m=step)
     if precise.noisy:
-        noise = Quantity(precise.noise_m, "m", limit=precise.noise_limit_m, usual=USUAL_NOISE_M)
+        noise = Quantity(precise.noise_m, "m", limit=precise.noise_limit_m, usual=NOISY_M.usual)
         yield finding("M132", context.at(), noise_m=noise)

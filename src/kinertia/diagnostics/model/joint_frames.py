@@ -15,23 +15,26 @@ from collections.abc import Iterator
 import numpy as np
 
 from kinertia.diagnostics.person_context import PersonContext
+from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, finding, with_evidence
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.bsp import FloatArray
 from kinertia.model.neutral_joints import NeutralJoints, angle_deg, mirrored, neutral_joints
 
-_AXIS_RAD = float(np.radians(5.0))
+_AXIS_RAD = Limit(np.radians(5.0), "rad", usual=(0.0, 0.0))
 """Fault-free models: 0.0 degrees. The left subtalar joint with the right one's frames: 13.9."""
-_POSITION_M = 0.015
+_POSITION_M = Limit(0.015, "m", usual=(0.0, 0.010))
 """Fault-free models: 0.0 mm; their segments differ in length by up to 10 mm. A talus whose offset has the other side's
 sign: 18 mm."""
-_FARTHEST_RAD = float(np.radians(25.0))
+_FARTHEST_RAD = Limit(np.radians(25.0), "rad", usual=(0.0, 0.21))
 """Models in use: 0.0 degrees. An axis along the foot: 38."""
 _USUAL = (0.7872, 0.6047, -0.1209)
 """Forward, up, to the right: of a right foot, as gait2354 and Rajagopal have it."""
 
 
+@check("O302", "O303", unless=("O301",), axis=_AXIS_RAD, position=_POSITION_M)
 def mirrored_joints(context: PersonContext) -> Iterator[Finding]:
     """Report O302 and O303: axes (O302) and positions (O303) of joints whose left and right do not mirror each other.
 
@@ -43,12 +46,12 @@ def mirrored_joints(context: PersonContext) -> Iterator[Finding]:
     for pair in neutral.pairs:
         for first, second, angle in _axis_angles(neutral, pair, neutral.sideways):
             if angle > _AXIS_RAD:
-                angle_rad = Quantity(angle, "rad", limit=_AXIS_RAD, usual=(0.0, 0.0))
+                angle_rad = Quantity(angle, "rad", limit=_AXIS_RAD, usual=_AXIS_RAD.usual)
                 yield _finding("O302", first, second, angle_rad=angle_rad)
     for right, left in neutral.pairs:
         distance = _mismatch_m(neutral, right, left, neutral.sideways)
         if distance > _POSITION_M:
-            distance_m = Quantity(distance, "m", limit=_POSITION_M, usual=(0.0, 0.010))
+            distance_m = Quantity(distance, "m", limit=_POSITION_M, usual=_POSITION_M.usual)
             yield _finding("O303", right, left, distance_m=distance_m)
 
 
@@ -128,6 +131,7 @@ def without_side(coordinate: str) -> str:
     return re.sub(r"_[rl](?=_|$)", "", coordinate)
 
 
+@check("O304", unless=("O301",), axis=_FARTHEST_RAD)
 def subtalar_axis(context: PersonContext) -> Iterator[Finding]:
     """Report O304: a subtalar axis far from where people have it (some 40 degrees up from the sole, 10 to 20
     inward)."""
@@ -146,7 +150,7 @@ def subtalar_axis(context: PersonContext) -> Iterator[Finding]:
     if far:
         # both sides in one: what is said of their asymmetry has the name that they share, too
         worst = max(far, key=far.__getitem__)
-        angle_rad = Quantity(far[worst], "rad", limit=_FARTHEST_RAD, usual=(0.0, 0.21))
+        angle_rad = Quantity(far[worst], "rad", limit=_FARTHEST_RAD, usual=_FARTHEST_RAD.usual)
         yield finding("O304", Where(part=without_side(worst)), angle_rad=angle_rad, joints=Quantity(", ".join(far)))
 
 

@@ -5,19 +5,22 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from kinertia.diagnostics.person_context import PersonContext
+from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, finding
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 
-_FARTHEST_M = 1.5
+_FARTHEST_M = Limit(1.5, "m")
 """Longest body from its joint: a thigh has half a metre, the end of a barbell is 1.1 m from its middle."""
-_SMALLEST_M, _LARGEST_M = 0.2, 3.0
+_SMALLEST_M, _LARGEST_M = Limit(0.2, "m"), Limit(3.0, "m")
 """Largest distance of two joints of a whole body: a newborn's legs, and a giant's stretched arms."""
 _WHOLE = 6
 """Joints from which on a model counts as a whole body."""
 
 
+@check("O301", farthest=_FARTHEST_M, smallest=_SMALLEST_M, largest=_LARGEST_M)
 def length_unit(context: PersonContext) -> Iterator[Finding]:
     """Report O301: joints, centres of mass or markers that are not in metres; the finding identifies the farthest."""
     if context.model is None:

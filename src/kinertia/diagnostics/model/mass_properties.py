@@ -17,31 +17,34 @@ from kinertia.diagnostics.model.model_check import (
     side_differences,
 )
 from kinertia.diagnostics.person_context import PersonContext
+from kinertia.diagnostics.runner import check
 from kinertia.diagnostics.subject.mass import ERROR_SHARE, WARNING_SHARE
 from kinertia.estimation.estimated_bodies import estimated_bodies
 from kinertia.findings.finding import Finding, Severity, finding
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.anatomy import segment_of
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters, FloatArray, impossible_segments, second_moments
 
-HEAVY_KG, NEGLIGIBLE_KG = 0.5, 0.1
+HEAVY_KG, NEGLIGIBLE_KG = Limit(0.5, "kg"), Limit(0.1, "kg")
 """Bodies that are lighter are judged less strictly, or not at all."""
-_DENSEST_KG_M3 = 5000.0
+_DENSEST_KG_M3 = Limit(5000.0, "kg/m3", usual=(0.0, 1300.0))
 """Heavy bodies of fault-free models are at most at 1300; patellae and other light ones have guesses up to 5600."""
-_LARGEST_RADIUS_M = 0.6
+_LARGEST_RADIUS_M = Limit(0.6, "m")
 """No part of a person has a larger radius of gyration (a rod of 2 m has 0.58 m)."""
-_HEAVIEST_KG, _LIGHTEST_KG = 300.0, 1.0
+_HEAVIEST_KG, _LIGHTEST_KG = Limit(300.0, "kg"), Limit(1.0, "kg")
 """Largest mass that a person may have, and less than a leg of a child."""
 _NO_EXTENT_M = 1e-4
 """Root mean square distance of the mass from its centre below which there is no inertia."""
-_ARMS_IN_TORSO = 0.42
+_ARMS_IN_TORSO = Limit(0.42, usual=(0.25, 0.32))
 """Torso's moment about its long axis over the mean of the other two: 0.25-0.32 in the literature for the torso with the
 head, 0.5 where the arms hang beside it and are counted in (gait2354, whose torso the models with arms took over: a
 known problem of the models of Hamner 2010 and Rajagopal 2016)."""
-_OUTLYING_SD = 2.0
+_OUTLYING_SD = Limit(2.0)
 
 
+@check("O201")
 def impossible_inertia(context: PersonContext) -> Iterator[Finding]:
     """Report O201: bodies whose inertia no distribution of mass can have."""
     if context.model is None:
@@ -58,6 +61,7 @@ def impossible_inertia(context: PersonContext) -> Iterator[Finding]:
         yield finding("O201", Where(part=name), severity, excess_kgm2=excess, condition=Quantity("; ".join(conditions)))
 
 
+@check("O202", heavy=HEAVY_KG)
 def missing_inertia(context: PersonContext) -> Iterator[Finding]:
     """Report O202: mass without inertia, or with a negative one, as if all of it were in a point."""
     if context.model is None:
@@ -71,6 +75,7 @@ def missing_inertia(context: PersonContext) -> Iterator[Finding]:
             yield finding("O202", Where(part=name), severity, mass_kg=Quantity(mass_kg, "kg"), radius_m=radius)
 
 
+@check("O203", "O204", density=_DENSEST_KG_M3, radius=_LARGEST_RADIUS_M, negligible=NEGLIGIBLE_KG)
 def inertia_size(context: PersonContext) -> Iterator[Finding]:
     """Report O203: bodies denser than anything in a person; O204: bodies larger than a person."""
     if context.model is None:
@@ -81,7 +86,7 @@ def inertia_size(context: PersonContext) -> Iterator[Finding]:
             radius_m = spread_m * np.sqrt(5.0 / 3.0)  # a sphere's mean square distance is 3/5 of its radius squared
             density = float(mass_kg / (4.0 / 3.0 * np.pi * radius_m**3))
             if density > _DENSEST_KG_M3:
-                dense = Quantity(density, "kg/m3", limit=_DENSEST_KG_M3, usual=(0.0, 1300.0))
+                dense = Quantity(density, "kg/m3", limit=_DENSEST_KG_M3, usual=_DENSEST_KG_M3.usual)
                 yield finding("O203", Where(part=name), density_kg_m3=dense)
         gyration_m = float(np.sqrt(max(inertia.diagonal().max(), 0.0) / mass_kg)) if mass_kg > 0 else 0.0
         if gyration_m > _LARGEST_RADIUS_M:
@@ -90,6 +95,7 @@ def inertia_size(context: PersonContext) -> Iterator[Finding]:
             yield finding("O204", Where(part=name), severity, radius_m=large, mass_kg=Quantity(mass_kg, "kg"))
 
 
+@check("O206", heaviest=_HEAVIEST_KG, lightest=_LIGHTEST_KG)
 def mass_unit(context: PersonContext) -> Iterator[Finding]:
     """Report O206: a model that weighs more than any person, or next to nothing."""
     if context.model is None:
@@ -100,6 +106,7 @@ def mass_unit(context: PersonContext) -> Iterator[Finding]:
         yield finding("O206", model_kg=Quantity(model_kg, "kg", limit=limit_kg))
 
 
+@check("O205")
 def degenerate_inertia(context: PersonContext) -> Iterator[Finding]:
     """Report O205: two principal moments that add up to the third exactly, as rounded ones do: a body without
     thickness."""
@@ -139,6 +146,7 @@ def _radii(bsp: BodySegmentParameters) -> list[tuple[str, float, float]]:
     return list(zip(bsp.segments, bsp.mass_kg.tolist(), radii.tolist(), strict=True))
 
 
+@check("O211")
 def placeholders(context: PersonContext) -> Iterator[Finding]:
     """Report O211: placeholder inertias that were never measured: three equal moments, or moments of at most two
     digits."""
@@ -159,6 +167,7 @@ def placeholders(context: PersonContext) -> Iterator[Finding]:
         yield finding("O211", Where(part=name), advice(context), moments_kgm2=values, pattern=Quantity(pattern))
 
 
+@check("O212", distance=_OUTLYING_SD)
 def unlike_tables(context: PersonContext) -> Iterator[Finding]:
     """Report O212: the parameter of each segment farthest from both tables, if farther than people are; a model that is
     fitted is compared at the mass to which the fit scales it.
@@ -187,6 +196,7 @@ def unlike_tables(context: PersonContext) -> Iterator[Finding]:
         )
 
 
+@check("O213", share=WARNING_SHARE, error=ERROR_SHARE)
 def model_mass(context: PersonContext) -> Iterator[Finding]:
     """Report O213: a model mass that differs from the person's. A fit scales the masses, so that only a difference
     larger than between people is reported there; legs alone cannot be scaled to the whole body's mass.
@@ -209,6 +219,7 @@ def model_mass(context: PersonContext) -> Iterator[Finding]:
     )
 
 
+@check("O214", mass=SIDE_MASS, com=SIDE_COM_M, moment=SIDE_MOMENT)
 def sides(context: PersonContext) -> Iterator[Finding]:
     """Report O214: pairs of bodies that do not mirror each other."""
     if context.model is None:
@@ -224,6 +235,7 @@ def sides(context: PersonContext) -> Iterator[Finding]:
         )
 
 
+@check("O215", ratio=_ARMS_IN_TORSO)
 def arms_in_torso(context: PersonContext) -> Iterator[Finding]:
     """Report O215: a torso with the arms' inertia in a model whose arms are bodies of their own."""
     if context.model is None:
@@ -241,10 +253,11 @@ def arms_in_torso(context: PersonContext) -> Iterator[Finding]:
             "O215",
             Where(part=bodies[0] if len(bodies) == 1 else "torso"),
             advice(context),
-            ratio=Quantity(ratio, "1", limit=_ARMS_IN_TORSO, usual=(0.25, 0.32)),
+            ratio=Quantity(ratio, "1", limit=_ARMS_IN_TORSO, usual=_ARMS_IN_TORSO.usual),
         )
 
 
+@check("O415")
 def compared_with_tables(context: PersonContext) -> Iterator[Finding]:
     """Report O415: what was not compared in a model that is checked on its own, and why."""
     if context.model is None or context.has_trials:

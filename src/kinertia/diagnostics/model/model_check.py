@@ -7,12 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.estimation.prior import literature_prior
+from kinertia.findings.limit import Limit
 from kinertia.model.anatomy import ModelSegments, model_segments
 from kinertia.model.anthropometry import BodyGeometry, check_subject, literature_bsp
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 
-SIDE_MASS, SIDE_COM_M, SIDE_MOMENT = 0.01, 0.005, 0.05
+SIDE_MASS, SIDE_COM_M, SIDE_MOMENT = Limit(0.01), Limit(0.005, "m"), Limit(0.05)
 """Notable differences of left and right: share of the mass, distance of the CoM, share of a moment."""
 _COLUMNS = ("mass\n(kg)", "CoM x\n(mm)", "y", "z", "Ixx\n(kg m2)", "Iyy", "Izz")
 

@@ -17,7 +17,9 @@ import numpy as np
 from kinertia.diagnostics.evidence.label_exchange import swapped_labels
 from kinertia.diagnostics.evidence.segment_distances import FEWEST_PAIRS, LOWER_BODY, SegmentDistances
 from kinertia.diagnostics.person_context import PersonContext
+from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, Severity, finding
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.anatomy import segment_of
@@ -26,19 +28,33 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.trial.data import FloatArray, Markers
 from kinertia.trial.rms import rms
 
-_OTHER_SCALE, _OTHER_BODY = 0.025, 0.05
+_OTHER_SCALE, _OTHER_BODY = Limit(0.025, usual=(-0.011, 0.011)), Limit(0.05)
 """Median share by which distances may differ: beyond the one a fit warns, beyond the other it refuses."""
-_NOBODY = 5.0
+_NOBODY = Limit(5.0)
 """Ratio of sizes that no two people have."""
-_ELSEWHERE_M = 0.014
-_ARRANGED = {("pelvis", "torso"): (5, 1.6), ("pelvis", "thigh_r", "thigh_l"): (8, 1.15)}
+_ELSEWHERE_M = Limit(0.014, "m", usual=(0.0, 0.011))
+_MIRRORED, _PLAINLY = Limit(1.6, usual=(0.02, 0.3)), Limit(1.15)
+_ARRANGED = {("pelvis", "torso"): (5, _MIRRORED), ("pelvis", "thigh_r", "thigh_l"): (8, _PLAINLY)}
 """Segments whose markers distinguish left from right in any pose; how many are needed, and how many times worse a fit
 decides. Markers in one plane fit as well as their mirror image: then the next segments are used."""
-_MOVED_M = 0.055
+MOVED_M = Limit(0.055, "m", usual=(0.005, 0.036))
 """Calibration moves markers of the lower body by 5 to 36 mm on fault-free trials."""
 _FRAMES = 60
 
 
+@check(
+    "L212",
+    "O401",
+    "O402",
+    "O404",
+    "O405",
+    size=_NOBODY,
+    mirrored=_MIRRORED,
+    plainly=_PLAINLY,
+    share=_OTHER_SCALE,
+    body=_OTHER_BODY,
+    distance=_ELSEWHERE_M,
+)
 def model_and_trials(context: PersonContext) -> Iterator[Finding]:
     """Report O401, O402, L212, O404 and O405: each trial's markers indicate another unit (O401), left and right
     interchanged (O402), swapped labels (L212), another scale (O404), or markers that were not placed (O405).
@@ -66,7 +82,7 @@ def model_and_trials(context: PersonContext) -> Iterator[Finding]:
             yield finding("O404", where, severity, ratio=scale, worst_pair=Quantity(distances.worst_pair()))
         rms_m = rms(distances.differences())
         if rms_m > _ELSEWHERE_M:
-            apart = Quantity(rms_m, "m", limit=_ELSEWHERE_M, usual=(0.0, 0.011))
+            apart = Quantity(rms_m, "m", limit=_ELSEWHERE_M, usual=_ELSEWHERE_M.usual)
             yield finding("O405", where, rms_m=apart, worst_pair=Quantity(distances.worst_pair()))
 
 
@@ -81,8 +97,8 @@ def moved_markers(before: Skeleton, after: Skeleton, trials: Sequence[Markers]) 
     place = {marker.label: np.array(marker.position) for marker in before.markers}
     for marker in after.markers:
         distance_m = float(np.linalg.norm(np.array(marker.position) - place[marker.label]))
-        if marker.label in shown and segment_of(marker.segment) in LOWER_BODY and distance_m > _MOVED_M:
-            distance = Quantity(distance_m, "m", limit=_MOVED_M, usual=(0.005, 0.036))
+        if marker.label in shown and segment_of(marker.segment) in LOWER_BODY and distance_m > MOVED_M:
+            distance = Quantity(distance_m, "m", limit=MOVED_M, usual=MOVED_M.usual)
             yield finding("O407", Where(markers=(marker.label,), part=marker.segment), distance_m=distance)
 
 
@@ -99,7 +115,7 @@ def _mirrored(places: Markers, trial: Markers, marker_set: MarkerSet) -> Quantit
         model = places.select(labels).positions[0]
         ratio = _mirror_ratio(model, person[whole[:: max(len(whole) // _FRAMES, 1)]])
         if ratio > limit:
-            return Quantity(ratio, "1", limit=limit, usual=(0.02, 0.3))
+            return Quantity(ratio, "1", limit=limit, usual=_MIRRORED.usual)
         if ratio < 1.0 / limit:
             break
     return None
@@ -119,6 +135,7 @@ def _mirror_ratio(model: FloatArray, person: FloatArray) -> float:
     return float(np.median(np.sqrt(np.maximum(turned, 0.0) / np.maximum(mirrored, 1e-12))))
 
 
+@check("O106", "O107")
 def markers_and_feet(context: PersonContext) -> Iterator[Finding]:
     """Report O106 and O107: a model without markers, which only a fit needs (O106), or without a body of a foot
     (O107)."""
@@ -132,6 +149,7 @@ def markers_and_feet(context: PersonContext) -> Iterator[Finding]:
             yield finding("O107", Where(part=foot), expected=Quantity(f"calcn_{side} or foot_{side}"))
 
 
+@check("O414")
 def unmatched_markers(context: PersonContext) -> Iterator[Finding]:
     """Report O414: markers of a trial that the model does not have."""
     if context.model is None:

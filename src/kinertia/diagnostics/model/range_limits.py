@@ -5,15 +5,16 @@ from collections.abc import Iterator
 import numpy as np
 
 from kinertia.findings.finding import Finding, finding
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.anatomy import segment_of
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.inverse_kinematics import InverseKinematics
 
-_AT_LIMIT, _BEYOND_RAD = 0.05, float(np.radians(10.0))
+AT_LIMIT, BEYOND_RAD = Limit(0.05), Limit(np.radians(10.0), "rad")
 """Share of the frames, and angle, from which on a limit of a coordinate's range is reported."""
-_CLAMPED = 0.2
+CLAMPED = Limit(0.2, usual=(0.0, 0.08))
 """Share of the frames from which on a clamped coordinate of legs or trunk is a fault of the model: on 30 fault-free
 trials with models of six makers it is 0.08 at most (knees that end straight), in one that clamps knees at 10 degrees
 0.33."""
@@ -40,10 +41,9 @@ def range_findings(skeleton: Skeleton, ik: InverseKinematics) -> Iterator[Findin
         unit = "rad" if skeleton.rotational[c] else "m"
         limits = Quantity((float(bounds.least[c]), float(bounds.most[c])), unit)
         share, past = float(at_limit[c]), float(beyond[c])
-        if share > _CLAMPED and c in moves:
-            usual = (0.0, 0.08)
-            clamped = Quantity(share, "1", limit=_CLAMPED, usual=usual)
+        if share > CLAMPED and c in moves:
+            clamped = Quantity(share, "1", limit=CLAMPED, usual=CLAMPED.usual)
             yield finding("O311", Where(part=name), share=clamped, range_rad=limits)
-        if share > _AT_LIMIT or (past > _BEYOND_RAD and skeleton.rotational[c]):
-            frames = Quantity(float(at_or_beyond[c]) / max(int(known[:, c].sum()), 1), "1", limit=_AT_LIMIT)
-            yield finding("O312", Where(part=name), share=frames, beyond_rad=Quantity(past, unit, limit=_BEYOND_RAD))
+        if share > AT_LIMIT or (past > BEYOND_RAD and skeleton.rotational[c]):
+            frames = Quantity(float(at_or_beyond[c]) / max(int(known[:, c].sum()), 1), "1", limit=AT_LIMIT)
+            yield finding("O312", Where(part=name), share=frames, beyond_rad=Quantity(past, unit, limit=BEYOND_RAD))

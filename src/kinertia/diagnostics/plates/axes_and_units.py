@@ -6,19 +6,22 @@ import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.force_mass import loaded_wrenches
+from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, finding
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.centre_of_pressure import free_moment
 from kinertia.trial.data import LOAD_THRESHOLD_N, PlateLoads
 
 _VERTICAL_SHARE = 0.7
 """Share of the largest force; a foot pushes sideways and backwards by less."""
-_WEAKEST_N = 0.3
+_WEAKEST_N = Limit(0.3)
 """Smallest peak of a load in kN, or in multiples of body weight."""
-_LONGEST_ARM_M, _USUAL_ARM_M, _FEWEST = 0.15, 0.04, 10
+_LONGEST_ARM_M, _FEWEST = Limit(0.15, "m", usual=(0.0, 0.04)), 10
 """Free moment over vertical force; so many samples under load, at least."""
 
 
+@check("P201", "P202", "P203", weakest=_WEAKEST_N, threshold=Limit(LOAD_THRESHOLD_N), lever_arm=_LONGEST_ARM_M)
 def axes_and_units(context: RecordingContext) -> Iterator[Finding]:
     """Report P201 to P203: forces in other axes or other units, going by the plates alone."""
     plates = context.plates
@@ -43,11 +46,10 @@ def axes_and_units(context: RecordingContext) -> Iterator[Finding]:
     for name, wrench in loaded_wrenches(plates, _FEWEST):
         lever_arm_m = float(np.median(np.abs(free_moment(wrench)) / wrench[:, 1]))
         if lever_arm_m > _LONGEST_ARM_M:
-            usual = (0.0, _USUAL_ARM_M)
             yield finding(
                 "P203",
                 context.at(plate=name),
-                lever_arm_m=Quantity(lever_arm_m, "m", limit=_LONGEST_ARM_M, usual=usual),
+                lever_arm_m=Quantity(lever_arm_m, "m", limit=_LONGEST_ARM_M, usual=_LONGEST_ARM_M.usual),
             )
 
 

@@ -10,23 +10,28 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory
 from kinertia.diagnostics.evidence.plate_contacts import COP_MIN_FORCE_N, PlateContact, cop_horizontal
 from kinertia.diagnostics.evidence.plate_edges import beyond_edges
 from kinertia.diagnostics.evidence.shared_and_stray_loads import FOOT_ENDS
+from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, Severity, finding
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import PlateLoads
 
-_FIXED_M = 0.002
-_BACKWARDS, _FORWARDS, _USUAL = -0.35, 0.25, (0.06, 0.82)
+_FIXED_M = Limit(0.002, "m")
+_USUAL = (0.06, 0.82)
+_BACKWARDS, _FORWARDS = Limit(-0.35, usual=_USUAL), Limit(0.25)
 """Shares of the distance from heel to forefoot."""
-OFF_PLATE_SHARE = 0.05
+OFF_PLATE_SHARE = Limit(0.05)
 """Share of the load with its centre of pressure off the plate that is reported; half of it is wrong."""
-_MOST_SHARE = 0.5
+_MOST_SHARE = Limit(0.5)
 
 
+@check("P251", "P252", unless=needs.LOADS_UNDER_FEET, fixed=_FIXED_M, backwards=_BACKWARDS, forwards=_FORWARDS)
 def cop_progression(context: RecordingContext) -> Iterator[Finding]:
     """Report P251 and P252: plates whose centre of pressure never moves during a step (P251), or moves from toe to heel
     while on another plate it moves from heel to toe (P252).
@@ -93,6 +98,7 @@ def shows_feet_equally(context: RecordingContext) -> bool:
     return right == left
 
 
+@check("P245", unless=("P204",), off_plate=OFF_PLATE_SHARE, most=_MOST_SHARE)
 def cop_on_plate(context: RecordingContext) -> Iterator[Finding]:
     """Report P245: loads that act outside the corners of their plate."""
     if context.plates is None:

@@ -19,25 +19,57 @@ from kinertia.diagnostics.evidence.contact_fit import Hypothesis
 from kinertia.diagnostics.evidence.plate_contacts import FAR_M, PlateContact, displaced
 from kinertia.diagnostics.evidence.vertical_acceleration import LARGEST_RESIDUAL, vertical_match_of
 from kinertia.diagnostics.plates.cop_path import goes_forwards, heel_steps, one_foot_loads, shows_feet_equally
-from kinertia.diagnostics.plates.plate_positions import interchanged_plates, rotated_plates
-from kinertia.diagnostics.timing.contact_delays import contact_delays, fitted_rate_or_delay, stance_durations
+from kinertia.diagnostics.plates.plate_positions import WRONG_M, interchanged_plates, rotated_plates
+from kinertia.diagnostics.runner import check
+from kinertia.diagnostics.timing.contact_delays import (
+    DELAY_S,
+    LEAST_RATE_ERROR,
+    LONGEST_DELAY_S,
+    RATES,
+    contact_delays,
+    fitted_rate_or_delay,
+    stance_durations,
+)
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.rule import rule
 from kinertia.trial.data import FloatArray
 
-_OTHER_UNIT_M = 5.0
-_OFFSET_M = 0.03
-_BEGIN_M, _END_M = -0.015, 0.06
+_OTHER_UNIT_M = Limit(5.0, "m")
+_OFFSET_M = Limit(0.03, "m", usual=(-0.008, 0.008))
+_USUAL_BEGIN_M, _USUAL_END_M = (0.035, 0.1), (-0.06, 0.025)
+_BEGIN_M, _END_M = Limit(-0.015, "m", usual=_USUAL_BEGIN_M), Limit(0.06, "m", usual=_USUAL_END_M)
 """There is no foot behind the marker at the back of the heel: on fault-free trials, from squats to forefoot runs, the
 first twentieth of a load is 36 to 99 mm in front of it. The last one is at most 25 mm in front of the foremost marker,
 which may be on the metatarsals."""
 _BOTH_BACK_M, _BOTH_FORWARD_M = (0.02, -0.07), (0.13, 0.035)
 """Where the first twentieth of steps and their last one are both, on average, farther back, or farther forward, landing
 or pushing off cannot be the reason. On nine fault-free trials they are 36 to 85 mm and -58 to 25 mm."""
-_USUAL_BEGIN_M, _USUAL_END_M = (0.035, 0.1), (-0.06, 0.025)
 
 
+@check(
+    "P204",
+    "P241",
+    "P242",
+    "P243",
+    "P244",
+    "T201",
+    "T211",
+    "T212",
+    unless=("P201", "P202", "P203", "P107"),
+    beyond=_OTHER_UNIT_M,
+    far=FAR_M,
+    offset=_OFFSET_M,
+    begin=_BEGIN_M,
+    end=_END_M,
+    wrong=WRONG_M,
+    least_ratio=RATES[0],
+    most_ratio=RATES[1],
+    growth=LEAST_RATE_ERROR,
+    delay=DELAY_S,
+    longest=LONGEST_DELAY_S,
+)
 def loads_and_feet(context: RecordingContext) -> Iterator[Finding]:
     """Report P204, P24, T20, T21 and P243: the explanation that leaves loads nearest to the feet and to their times,
     with the others among its causes; of equally good ones the first tested. Where loads fit: P243 of small offsets.
@@ -125,7 +157,7 @@ def _offset(context: RecordingContext) -> Iterator[Finding]:
         return
     mean = (np.mean(means[0], axis=0) + np.mean(means[1], axis=0)) / 2
     if np.linalg.norm(mean) > _OFFSET_M:
-        offset = Quantity((float(mean[0]), float(mean[1])), "m", limit=_OFFSET_M, usual=(-0.008, 0.008))
+        offset = Quantity((float(mean[0]), float(mean[1])), "m", limit=_OFFSET_M, usual=_OFFSET_M.usual)
         yield _origin(context, offset, len(contacts), "loads of both feet displaced from the line between heel and toe")
         return
     if steps := heel_steps(context):

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.horizontal_velocity import (
     LEAST_CHANGE_M_S,
@@ -27,7 +28,9 @@ from kinertia.diagnostics.evidence.horizontal_velocity_residual import (
     misread_plate_residuals,
     rotated_residual,
 )
+from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, finding, with_evidence
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.rule import rule
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, free_moment
@@ -35,18 +38,18 @@ from kinertia.trial.data import PlateLoads, Trial
 from kinertia.trial.rms import rms
 from kinertia.trial.sampled_time import span_s
 
-_OPPOSED, _USUAL_CORRELATION = -0.4, (0.5, 1.0)
+_OPPOSED = Limit(-0.4, usual=(0.5, 1.0))
 _CLEAR, _CLEAR_ROTATION, _ROTATED_DEG = 0.7, 0.35, 60.0
-_ONE_REVERSED, _LEAST_REVERSED_M_S, _LONG_WINDOW_S = 0.65, 0.08, 1.0
+_ONE_REVERSED, _LEAST_REVERSED_M_S, _LONG_WINDOW_S = Limit(0.65), 0.08, 1.0
 """Where one plate's sign is wrong, reversing it leaves 0.04 to 0.57 of the residual on five trials; on nine fault-free
 ones 0.9 (squats), 1.4 (runs) and more."""
 
-_ONE_MISREAD = 0.8
+_ONE_MISREAD = Limit(0.8)
 """Where one plate's axes are exchanged or rotated, undoing it leaves 0.06 to 0.78 on 19 walks, on fault-free ones 1 and
 more."""
 
 
-_MUCH_SMALLER = 0.5
+_MUCH_SMALLER = Limit(0.5)
 _LEAST_PUSH, _USUAL_PUSH = 0.02, (0.08, 0.3)
 
 
@@ -58,6 +61,18 @@ class _Hypothesis:
     residual_m_s: float
 
 
+@check(
+    "P231",
+    "P232",
+    "P233",
+    "P236",
+    unless=needs.VELOCITY,
+    opposed=_OPPOSED,
+    moment=_MUCH_SMALLER,
+    reversed_share=_ONE_REVERSED,
+    misread=_ONE_MISREAD,
+    best=CLEARLY_BEST,
+)
 def force_directions(context: RecordingContext) -> Iterator[Finding]:
     """Report P231 to P233 and P236: the hypothesis with the smallest residual; other sufficient ones are among its
     causes.
@@ -116,7 +131,7 @@ def _rotated(
         "P231",
         context.at(),
         angle_rad=Quantity(angle, "rad", limit=float(np.radians(_ROTATED_DEG))),
-        correlation=Quantity(tuple(correlations[axis] for axis in HORIZONTAL), "1", usual=_USUAL_CORRELATION),
+        correlation=Quantity(tuple(correlations[axis] for axis in HORIZONTAL), "1", usual=_OPPOSED.usual),
         correlation_undone=Quantity(strength, "1", limit=_CLEAR_ROTATION),
     )
     return _Hypothesis(found, residual)
@@ -127,7 +142,7 @@ def _reversed_axis(context: RecordingContext, residual: VelocityResidual, correl
     found = finding(
         "P232",
         context.at(**context.along(axis)),
-        correlation=Quantity(correlation, "1", limit=_OPPOSED, usual=_USUAL_CORRELATION),
+        correlation=Quantity(correlation, "1", limit=_OPPOSED, usual=_OPPOSED.usual),
         velocity_residual_m_s=residual.evidence(residual.all_reversed, residual.as_read),
         beside=Quantity(" and the vertical moment" if _moment_reversed(context.plates, axis) else ""),
     )
@@ -152,6 +167,7 @@ def _moment_reversed(plates: PlateLoads | None, axis: int) -> bool:
     return left_nm[1] < _MUCH_SMALLER * left_nm[0]
 
 
+@check("P238", unless=needs.VERTICAL_FORCE)
 def vertical_signs(context: RecordingContext) -> Iterator[Finding]:
     """Report P238: a plate that was reversed when it was read, since its vertical force pointed down, unlike others',
     and that pushes first and brakes later since."""

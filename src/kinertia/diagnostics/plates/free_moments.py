@@ -19,10 +19,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.force_mass import carrying, loaded_wrenches
 from kinertia.diagnostics.evidence.strides import periods
+from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, finding
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.rule import rule
 from kinertia.trial.centre_of_pressure import centre_of_pressure, free_moment
@@ -31,14 +34,14 @@ from kinertia.trial.file_contents import TorqueColumns
 from kinertia.trial.rms import rms
 from kinertia.trial.sampled_time import TIME_TOLERANCE_S, span_s, within
 
-_ABSENT_NM = 0.005
+_ABSENT_NM = Limit(0.005, "N m")
 """Amplifiers have more noise than this. Feet twist against the ground by some N m."""
-_COLUMNS_ARM_M, _USUAL_COLUMNS_ARM_M = 0.005, 0.001
+_COLUMNS_ARM_M = Limit(0.005, "m", usual=(0.0, 0.001))
 """A load displaced by this much changes joint moments by 2 to 4 N m."""
 _LITTLE, _SOME_NM, _LARGEST_NM = 0.1, 0.2, 10.0
 """RMS of free moments of walks and runs: 0.8 to 6 N m."""
 _LONG_ARM_M, _USUAL_PERCENT, _ACCOUNTED, _FEWEST = 0.034, 95.0, 1.8, 20
-VERTICAL_MOMENT_LEVER_M = 0.002
+VERTICAL_MOMENT_LEVER_M = Limit(0.002, "m")
 """A mean vertical moment above body weight times this contradicts gait.
 
 For 70 kg it is 1.4 N m: about a body's 1.2 kg m2 it adds 80 degrees a second with every stride. Of the measured walks
@@ -49,6 +52,7 @@ _FREE_SHARE = 0.5
 """Share of the mean vertical moment from which on the free moments under the feet are its likeliest cause."""
 
 
+@check("P261", "P262", "P263", "P264", unless=needs.VERTICAL_FORCE, lever_arm=_COLUMNS_ARM_M, absent=_ABSENT_NM)
 def free_moments(context: RecordingContext) -> Iterator[Finding]:
     """Report P261 to P264: free moments that contradict the forces of their plate."""
     plates = context.plates
@@ -75,11 +79,10 @@ def _columns(context: RecordingContext, plates: PlateLoads) -> Iterator[Finding]
                 "P262", context.at(plate=name, **context.along(2 if z > x else 0)), rms_nm=Quantity(one.rms_nm, "N m")
             )
         elif one.lever_arm_m > _COLUMNS_ARM_M:
-            usual = (0.0, _USUAL_COLUMNS_ARM_M)
             yield finding(
                 "P261",
                 context.at(plate=name),
-                lever_arm_m=Quantity(one.lever_arm_m, "m", limit=_COLUMNS_ARM_M, usual=usual),
+                lever_arm_m=Quantity(one.lever_arm_m, "m", limit=_COLUMNS_ARM_M, usual=_COLUMNS_ARM_M.usual),
                 horizontal_rms_nm=Quantity(across, "N m"),
                 method=Quantity("columns"),
             )
@@ -175,6 +178,7 @@ class MeanVerticalMoment:
         return sum(self.free_nm) / self.moment_nm >= _FREE_SHARE
 
 
+@check("P266", unless=needs.VELOCITY, lever_arm=VERTICAL_MOMENT_LEVER_M)
 def vertical_moment(context: RecordingContext) -> Iterator[Finding]:
     """Report P266: a mean vertical moment about the middle of the pelvis markers, in the longest measured window; not
     in turns."""

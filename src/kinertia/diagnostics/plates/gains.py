@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.horizontal_velocity import ForceVelocity
 from kinertia.diagnostics.evidence.horizontal_velocity_residual import (
@@ -19,20 +20,34 @@ from kinertia.diagnostics.evidence.horizontal_velocity_residual import (
     steady_scaled,
 )
 from kinertia.diagnostics.evidence.vertical_acceleration import vertical_match_of
+from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, with_evidence
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import PlateLoads
 from kinertia.trial.sampled_time import span_s, within
 
-_DIFFERENCE = 0.075
-_LEAST_WINDOW_S, _LEAST_GAIN, _RESIDUAL_SHARE = 1.0, 0.025, 0.9
+_DIFFERENCE = Limit(0.075, usual=(0.0, 0.02))
+_LEAST_WINDOW_S, _LEAST_GAIN, _RESIDUAL_SHARE = 1.0, Limit(0.025, usual=(0.0, 0.01)), 0.9
 """In 31 fault-free trials, gains by pelvis and by marker-based centre have the same sign and are both beyond 0.5 % in
 eight, and beyond 1 % in one. They must also explain this share of the residual, which gains found in a jump do not."""
-_SCALED, _LEAST_RESIDUAL_M_S, _FACTORS = 0.55, 0.05, ((0.4, 0.75), (1.35, 4.0))
+_SCALED, _LEAST_RESIDUAL_M_S = 0.55, 0.05
+_FACTORS = ((Limit(0.4), Limit(0.75)), (Limit(1.35), Limit(4.0)))
 """Twice the force along one axis of a walk leaves 0.08 to 0.45 of the residual; of residuals of fault-free trials that
 are as large another gain leaves 0.72 and more, or another zero explains more. Beyond these factors it is no gain."""
 
 
+@check(
+    "P221",
+    "P222",
+    unless=needs.VELOCITY,
+    difference=_DIFFERENCE,
+    gain=_LEAST_GAIN,
+    smaller=_FACTORS[0][0],
+    small=_FACTORS[0][1],
+    large=_FACTORS[1][0],
+    larger=_FACTORS[1][1],
+)
 def gains(context: RecordingContext) -> Iterator[Finding]:
     """Report P221 and P222: P221 by single support on each plate, else by vertical velocity; P222 of each horizontal
     axis."""
@@ -62,7 +77,7 @@ def _by_single_support(context: RecordingContext) -> Finding | None:
         context,
         (heavy, light),
         (mass_kg[heavy], mass_kg[light]),
-        gain=Quantity(gain, "1", limit=_DIFFERENCE, usual=(0.0, 0.02)),
+        gain=Quantity(gain, "1", limit=_DIFFERENCE, usual=_DIFFERENCE.usual),
         method=Quantity("single support"),
     )
 
@@ -96,7 +111,7 @@ def _by_vertical_velocity(context: RecordingContext, plates: PlateLoads) -> Find
             context,
             (heavy, light),
             (heavy_kg, light_kg),
-            gain=Quantity(heavy_kg / light_kg - 1.0, "1", limit=_LEAST_GAIN, usual=(0.0, 0.01)),
+            gain=Quantity(heavy_kg / light_kg - 1.0, "1", limit=_LEAST_GAIN, usual=_LEAST_GAIN.usual),
             residual_share=Quantity((float(np.mean([each.residual for each in read])), float(residual.mean())), "1"),
             method=Quantity("vertical velocity"),
         )

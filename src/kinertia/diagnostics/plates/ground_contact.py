@@ -2,19 +2,39 @@
 
 from collections.abc import Iterator
 
+from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.force_mass import FOREIGN_SHARE
-from kinertia.diagnostics.evidence.plate_edges import OVERHANG_M
-from kinertia.diagnostics.evidence.shared_and_stray_loads import STRAY_M
+from kinertia.diagnostics.evidence.force_mass import FOREIGN_S, FOREIGN_SHARE, MOSTLY
+from kinertia.diagnostics.evidence.plate_edges import HALLUX_M, NO_FOOT_M, OVERHANG_M
+from kinertia.diagnostics.evidence.shared_and_stray_loads import OTHERS_SHARE, OUTSIDE_M, STRAY_M
+from kinertia.diagnostics.runner import check
 from kinertia.errors import KinertiaError
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.motion.common_cutoff import LOWEST_HZ
 from kinertia.motion.kinematics import END_PERIODS, FEWEST_FRAMES, legs_on_plates
-from kinertia.trial.plate_assignment import FOOT_NAMES, no_forces
+from kinertia.trial.plate_assignment import FOOT_NAMES, SHORTEST_CONTACT_S, no_forces
 from kinertia.trial.sampled_time import within
 
 
+@check(
+    "F191",
+    "P271",
+    "P273",
+    "P274",
+    "P275",
+    "P277",
+    "P278",
+    "P279",
+    "P280",
+    "P283",
+    "P286",
+    "P290",
+    "T104",
+    frames=Limit(FEWEST_FRAMES),
+    shortest=Limit(SHORTEST_CONTACT_S, "s"),
+)
 def complete_contact(context: RecordingContext) -> Iterator[Finding]:
     """Report T104, P271, P278: no trial can be made of the recording; P279: it has too few frames with complete
     contact; P290: it has these of single legs only; P273, P274, P275, P277: how its loads were sorted by foot; P280,
@@ -73,6 +93,7 @@ def _too_few_frames(context: RecordingContext) -> Finding | None:
     return None if frames >= fewest else finding("T104", context.at(), frames=Quantity(frames, "1", limit=fewest))
 
 
+@check("P276", unless=needs.LOADS_UNDER_FEET, outside=OUTSIDE_M, share=OTHERS_SHARE)
 def both_feet(context: RecordingContext) -> Iterator[Finding]:
     """Report P276: a load between the feet; both are on the plate, and only their total load is known."""
     plates = context.plates
@@ -83,6 +104,7 @@ def both_feet(context: RecordingContext) -> Iterator[Finding]:
         yield finding("P276", where, share=Quantity(one.share, "1", limit=one.limit))
 
 
+@check("P282", unless=needs.LOADS_UNDER_FEET, overhang=OVERHANG_M, hallux=HALLUX_M, edge=NO_FOOT_M)
 def plate_edges(context: RecordingContext) -> Iterator[Finding]:
     """Report P282: feet that extend beyond the plate that they stand on, onto the floor."""
     plates = context.plates
@@ -97,6 +119,7 @@ def plate_edges(context: RecordingContext) -> Iterator[Finding]:
         )
 
 
+@check("P284", unless=("P201", "P202", "P203", "P204"), share=FOREIGN_SHARE, lasts=FOREIGN_S, right=MOSTLY)
 def foreign_load(context: RecordingContext) -> Iterator[Finding]:
     """Report P284: a foreign load; an ERROR if it leaves hardly any frames."""
     found = context.foreign_load
@@ -110,9 +133,10 @@ def foreign_load(context: RecordingContext) -> Iterator[Finding]:
     yield finding("P284", where, None if left else Severity.ERROR, surplus=surplus)
 
 
+@check("P285", far=STRAY_M)
 def stray_loads(context: RecordingContext) -> Iterator[Finding]:
     """Report P285: loads that are under no foot and were left out."""
     names = () if context.plates is None else context.plates.names
     for one in context.stray_contacts:
         where = context.at(plate=names[one.plate], span_s=(float(one.time[0]), float(one.time[-1])))
-        yield finding("P285", where, distance_m=Quantity(one.distance_m, "m", limit=STRAY_M, usual=(0.0, 0.04)))
+        yield finding("P285", where, distance_m=Quantity(one.distance_m, "m", limit=STRAY_M, usual=STRAY_M.usual))

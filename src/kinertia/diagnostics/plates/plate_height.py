@@ -11,15 +11,19 @@ import numpy as np
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.plate_contacts import PlateContact
 from kinertia.diagnostics.person_context import PersonContext
+from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, finding
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import PlateLoads
 
-_LEAST_M, _USUAL_M = 0.0, (0.007, 0.051)
+_USUAL_M = (0.007, 0.051)
+_LEAST_M = Limit(0.0, "m", usual=_USUAL_M)
 _LOW = 10.0
 """Percentile of a marker's height: it is low for a part of a step only."""
 
 
+@check("P249", unless=("M143",), height=_LEAST_M)
 def plate_heights(context: PersonContext) -> Iterator[Finding]:
     """Report P249: plates, or centres of pressure in a file, above the lowest markers of all feet on them."""
     for trial in context.trials:

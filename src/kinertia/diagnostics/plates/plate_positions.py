@@ -20,12 +20,14 @@ from kinertia.diagnostics.evidence.plate_contacts import (
     cop_horizontal,
     displaced,
 )
+from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, finding
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
 from kinertia.trial.rms import rms
 
-_WRONG_M, _RIGHT_M, _CLEARLY_BEST = 0.1, 0.08, 0.6
+WRONG_M, _RIGHT_M, _CLEARLY_BEST = Limit(0.1, "m", usual=(0.016, 0.075)), 0.08, 0.6
 _ORDER = "a wrong order of the corners"
 _CHANNELS = "interchanged channels of the plate moments Mx and My"
 _ABOUT_X, _ABOUT_Z = (f"a wrong sign of the plate moment about {axis}" for axis in "XZ")
@@ -53,13 +55,13 @@ _OPERATIONS = (
 )
 _DIFFERENCE = 0.25
 """Share of their distance by which the displacements of two plates may differ from being opposite."""
-_EQUAL = 0.03
+_EQUAL = Limit(0.03)
 """RMS difference of two forces over their peak. Both feet in a squat, which load two plates alike, differ by 0.1, since
 each pushes outwards."""
 _OF_VARIATION = 0.3
 """The same over the variation of the force under load: a person who stands evenly loads two plates alike, and sways
 from one to the other."""
-_PROPORTIONAL, _SAME_PLACE_M = 0.99, 0.02
+_PROPORTIONAL, _SAME_PLACE_M = Limit(0.99), 0.02
 _LOADED_N = 5 * LOAD_THRESHOLD_N
 _FEWEST = 20
 """Samples under load."""
@@ -74,7 +76,7 @@ def rotated_plates(context: RecordingContext) -> Iterator[Hypothesis]:
     if plates is None or feet is None or plates.corners is None or not steps or not context.has_strides:
         return
     read_m = _distances(steps, [one.place for one in steps], feet)
-    if read_m.max() < _WRONG_M:
+    if read_m.max() < WRONG_M:
         return
     middle = plates.corners.mean(axis=1)[:, [0, 2]]
     used = sorted({one.plate for one in steps})
@@ -104,7 +106,7 @@ def rotated_plates(context: RecordingContext) -> Iterator[Hypothesis]:
         context.at(plate=plates.names[wrong[0]] if len(wrong) == 1 else None),
         causes=(cause, *(f"{name}: {other}" for name, _, other in (_OPERATIONS[one[0]] for one in alike))),
         mend=Quantity(_MENDING[cause]),
-        before_m=Quantity(float(read_m.max()), "m", limit=_WRONG_M, usual=(0.016, 0.075)),
+        before_m=Quantity(float(read_m.max()), "m", limit=WRONG_M, usual=WRONG_M.usual),
         after_m=Quantity(float(left_m[best].max()), "m", limit=_RIGHT_M),
         operation=Quantity(operation),
         plates=Quantity(" and ".join(plates.names[p] for p in wrong)),
@@ -200,6 +202,7 @@ def _opposite(context: RecordingContext, plates: PlateLoads, feet: Feet) -> Iter
     yield _interchanged(context, used, displaced(plates, by), size, residual)
 
 
+@check("P287", equal=_EQUAL, proportional=_PROPORTIONAL)
 def repeated_plates(context: RecordingContext) -> Iterator[Finding]:
     """Report P287: the load of a plate is another plate's, or two others' together."""
     plates = context.recording.plates

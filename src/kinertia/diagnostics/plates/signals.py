@@ -12,47 +12,67 @@ from dataclasses import replace
 
 import numpy as np
 
+from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.force_mass import carrying, loaded_wrenches, wrenches
+from kinertia.diagnostics.evidence.force_mass import ADULT_KG, STEP_N, carrying, loaded_wrenches, wrenches
+from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, Severity, finding
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, centre_of_pressure
 from kinertia.trial.data import BoolArray, FloatArray, PlateLoads
-from kinertia.trial.force_spikes import LIMITS_N
+from kinertia.trial.force_spikes import LIMITS_N, LONGEST_S
 from kinertia.trial.sampled_time import runs, span_s
 
-_DEAD_N, _DEAD_NM = 0.5, 0.5
+_DEAD_N, _DEAD_NM = Limit(0.5, "N"), Limit(0.5, "N m")
 """Amplifiers have more noise than this."""
-_CARRIED_SHARE = 0.4
+_CARRIED_SHARE = Limit(0.4)
 """Share of the median load that a foot at contact or off takes several samples to gain or lose."""
-_DROPPED_S = 0.06
+_DROPPED_S = Limit(0.06, "s")
 """The next foot does not land sooner on one plate, even in running."""
-_SAME, _SATURATED_S, _FEWEST_SATURATED, _STEEP = 1e-6, 0.02, 4, 0.02
+_SAME, _SATURATED_S, _FEWEST_SATURATED, _STEEP = 1e-6, Limit(0.02, "s"), 4, 0.02
 """At the end of a range a force stays exactly the same, and comes and goes steeply."""
 _FULL_RANGE_N, _FULL_RANGE_ACROSS_N = 200.0, 30.0
 """Smallest ranges of amplifiers, as forces of an adult."""
-_REPEATED_S, _LONG_REPEATED_S, _FEWEST_REPEATED, _LEAP_STEPS = 0.025, 0.1, 3, 3.0
+_REPEATED_S, _LONG_REPEATED_S = Limit(0.025, "s", usual=(0.0, 0.002)), Limit(0.1, "s")
+_FEWEST_REPEATED, _LEAP_STEPS = 3, 3.0
 """Loads of 25 fault-free trials never stay the same in all channels for more than 2 ms. Long repetitions shift where
 contacts begin and end."""
 _QUANTISED, _STEPS = 4.0, 3.2
 """A round peak that is flat for being rounded lasts at most twice as long as the next three steps on one side of it."""
-_COARSE_N, _COARSE_M = 7.5, 0.0075
+_COARSE_N, _COARSE_M = Limit(7.5, "N", usual=(0.0, 4.9)), Limit(0.0075, "m")
 """Steps of 5 N, or of 5 mm, change joint moments by less than their SDs; of 10 N, or 10 mm, by up to twice
 those."""
 _FEWEST_SAMPLES, _FEWEST_VALUES, _OFF_STEP, _DECIMALS_N, _DECIMALS_M = 20, 3, 0.01, 3, 5
-_OVERSHOOT_S, _OVERSHOOT_HZ_S = 0.06, 0.45
+_OVERSHOOT_S, _OVERSHOOT_HZ_S = Limit(0.06, "s", usual=(0.0, 0.003)), 0.45
 """A Butterworth filter of second order, forth and back, overshoots for 0.06 s at 7 Hz and for 0.09 s at 5 Hz."""
 _MAINS_HZ = (50.0, 60.0)
 _BESIDE_HZ = (-16.0, -13.0, -10.0, 10.0, 13.0, 16.0)
-_HUM_N, _BESIDE_N, _STANDS_OUT = 4.0, 0.2, 6.0
-_LOUD_N, _FILTERED = 15.0, 2.0
+_HUM_N, _BESIDE_N, _STANDS_OUT = Limit(4.0, "N", usual=(0.0, 0.9)), 0.2, Limit(6.0)
+_LOUD_N, _FILTERED = Limit(15.0, "N"), 2.0
 """This amplitude crosses the load threshold several times at contact and off, unless the unloaded plate shows it:
 then its noise sets the threshold, and forces are low-passed. In a measured walk, 20 and 71 N at 50 Hz then change leg
 moments by 1 to 1.4 SD (RMS), and by up to 29 N m at foot contact."""
 _SHORTEST_S, _SAMPLES_PER_PERIOD, _SLOW_ORDER = 0.2, 3.0, 6
 
 
+@check(
+    "P101",
+    "P102",
+    "P103",
+    "P104",
+    "P109",
+    unless=needs.VERTICAL_FORCE,
+    dead=_DEAD_N,
+    step=STEP_N,
+    adult=ADULT_KG,
+    dropped=_DROPPED_S,
+    carried=_CARRIED_SHARE,
+    repeated=_REPEATED_S,
+    long=_LONG_REPEATED_S,
+    saturated=_SATURATED_S,
+)
 def signals(context: RecordingContext) -> Iterator[Finding]:
     """Report P101 to P104 and P109: faulty signals of every plate and axis."""
     if context.plates is None:
@@ -76,6 +96,7 @@ def _dead_channels(context: RecordingContext, plates: PlateLoads) -> Iterator[Fi
                 )
 
 
+@check("P111", unless=needs.VERTICAL_FORCE, dead=_DEAD_NM, step=STEP_N, adult=ADULT_KG)
 def dead_moments(context: RecordingContext) -> Iterator[Finding]:
     """Report P111: a horizontal axis about whose middle a plate that supports a person has no moment; readers add to
     that of its channel the horizontal force times the depth of the transducers."""
@@ -149,7 +170,7 @@ def _repeated_samples(context: RecordingContext, plates: PlateLoads) -> Iterator
                 "P103",
                 context.at(plate=name, span_s=(start, end)),
                 Severity.ERROR if lasts >= _LONG_REPEATED_S else None,
-                span_s=Quantity(lasts, "s", limit=_REPEATED_S, usual=(0.0, 0.002)),
+                span_s=Quantity(lasts, "s", limit=_REPEATED_S, usual=_REPEATED_S.usual),
             )
 
 
@@ -171,6 +192,7 @@ def _saturated(context: RecordingContext, plates: PlateLoads) -> Iterator[Findin
                     )
 
 
+@check("P109", vertical=Limit(LIMITS_N[1], "N"), horizontal=Limit(LIMITS_N[0], "N"), lasts=Limit(LONGEST_S, "s"))
 def spikes(context: RecordingContext) -> Iterator[Finding]:
     """Report P109: each plate's largest spike, of those that the reader has bridged."""
     plates = context.plates
@@ -208,6 +230,15 @@ def _as_long(mask: BoolArray) -> int:
     return len(mask) if mask.all() else int(np.argmin(mask))
 
 
+@check(
+    "P105",
+    "P106",
+    "P108",
+    unless=needs.VERTICAL_FORCE,
+    force_step=_COARSE_N,
+    cop_step=_COARSE_M,
+    overshoot=_OVERSHOOT_S,
+)
 def quantisation(context: RecordingContext) -> Iterator[Finding]:
     """Report P105, P106 and P108: forces, or centres of pressure, in coarse steps; forces spread in time by a
     filter."""
@@ -218,7 +249,7 @@ def quantisation(context: RecordingContext) -> Iterator[Finding]:
         step_n = max(quantisation_n(values) for values in wrench[:, :3].T)
         if step_n > _COARSE_N:
             yield finding(
-                "P105", context.at(plate=name), step_n=Quantity(step_n, "N", limit=_COARSE_N, usual=(0.0, 4.9))
+                "P105", context.at(plate=name), step_n=Quantity(step_n, "N", limit=_COARSE_N, usual=_COARSE_N.usual)
             )
         point = centre_of_pressure(wrench)
         step_m = max(_step(point[:, axis], _DECIMALS_M) for axis in (0, 2))
@@ -229,7 +260,7 @@ def quantisation(context: RecordingContext) -> Iterator[Finding]:
             yield finding(
                 "P108",
                 context.at(plate=name),
-                overshoot_s=Quantity(unloaded.overshoot_s, "s", limit=_OVERSHOOT_S, usual=(0.0, 0.003)),
+                overshoot_s=Quantity(unloaded.overshoot_s, "s", limit=_OVERSHOOT_S, usual=_OVERSHOOT_S.usual),
                 cutoff_hz=Quantity(_OVERSHOOT_HZ_S / unloaded.overshoot_s, "Hz"),
             )
 
@@ -248,6 +279,7 @@ def _step(values: FloatArray, decimals: int) -> float:
     return step if np.abs(steps - np.round(steps)).max() < _OFF_STEP else 0.0
 
 
+@check("P107", unless=needs.VERTICAL_FORCE, amplitude=_HUM_N, times=_STANDS_OUT, loud=_LOUD_N)
 def mains_interference(context: RecordingContext) -> Iterator[Finding]:
     """Report P107: mains interference of every plate and axis, at the stronger of the two mains frequencies."""
     plates = context.plates
@@ -265,7 +297,7 @@ def mains_interference(context: RecordingContext) -> Iterator[Finding]:
                     "P107",
                     context.at(plate=name, **context.along(axis)),
                     Severity.ERROR if amplitude_n > max(_LOUD_N, _FILTERED * noises_n[p]) else None,
-                    amplitude_n=Quantity(float(amplitude_n), "N", limit=_HUM_N, usual=(0.0, 0.9)),
+                    amplitude_n=Quantity(float(amplitude_n), "N", limit=_HUM_N, usual=_HUM_N.usual),
                     frequency_hz=Quantity(_MAINS_HZ[mains_hz], "Hz"),
                 )
 

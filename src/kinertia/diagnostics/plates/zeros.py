@@ -10,11 +10,14 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.force_mass import STEP_N
+from kinertia.diagnostics.evidence.force_mass import ADULT_KG, STEP_N
 from kinertia.diagnostics.evidence.horizontal_velocity import ForceVelocity
 from kinertia.diagnostics.evidence.horizontal_velocity_residual import CLEARLY_BEST, HORIZONTAL, VelocityResidual
+from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.rule import rule
 from kinertia.model.skeleton import GRAVITY_M_S2
@@ -23,18 +26,19 @@ from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
 from kinertia.trial.sampled_time import span_s, within
 from kinertia.trial.unloaded_level import ZEROED_N, ZEROED_NM, UnloadedReading
 
-_ZERO_N, _FAR_FROM_ZERO_N, _DRIFT_N = 15.0, 40.0, 15.0
+_ZERO_N = Limit(15.0, "N", usual=(-3.0, 3.0))
+_FAR_FROM_ZERO_N, _DRIFT_N = Limit(40.0, "N"), Limit(15.0, "N")
 """For 70 kg, of whose weight 40 N are 6 %; zeroed plates read a few newtons."""
-_LEAST_N = 6.0
+_LEAST_N = Limit(6.0, "N")
 """Lowest limit, twice what zeroed plates read, however light the person."""
 _MOST_UNLOADED_N, _STEADY_N = 150.0, 15.0
 _UNLOADED_PERCENT = (2.0, 15.0)
 """Percentage of the record for which a plate that is walked over is at least unloaded."""
 _UNKNOWN = UnloadedReading((np.nan, np.nan, np.nan), np.nan, 0.0, 0.0)
-_FORCE_N, _WINDOW_S = 20.0, 1.0
+_FORCE_N, _WINDOW_S = Limit(20.0, "N"), Limit(1.0, "s")
 """Mean over a window; over one that is shorter than this, pelvis and centre of mass part by as much
 velocity in less time."""
-_PLATE_ZERO_N, _LEAST_WINDOW_S, _LEAST_RESIDUAL_M_S = 12.0, 0.75, 0.05
+_PLATE_ZERO_N, _LEAST_WINDOW_S, _LEAST_RESIDUAL_M_S = Limit(12.0, "N", usual=(-9.0, 9.0)), 0.75, 0.05
 _ZEROED, _USUAL_RESIDUAL_M_S = 0.75, 0.105
 """Of 31 fault-free trials zeros of one plate are up to 9 N; a drift of 40 N over a trial makes 13 to 24 N, and without
 it the residual is as on fault-free walks and runs."""
@@ -42,6 +46,17 @@ _AGREES = 0.5
 """Of the force that does not accelerate the body, what the unloaded plates' levels leave at most, if they are it."""
 
 
+@check(
+    "P211",
+    "P213",
+    "P216",
+    unless=needs.VERTICAL_FORCE,
+    drift=_DRIFT_N,
+    zero=_ZERO_N,
+    far=_FAR_FROM_ZERO_N,
+    least=_LEAST_N,
+    adult=ADULT_KG,
+)
 def zeros(context: RecordingContext) -> Iterator[Finding]:
     """Report P211, P213 and P216: zero offsets of every plate and axis; limits in newtons apply to adults.
 
@@ -70,6 +85,7 @@ def zeros(context: RecordingContext) -> Iterator[Finding]:
             yield _zero(context, name, 1, least_n, "minimum", Severity.ERROR)
 
 
+@check("P216", level=Limit(ZEROED_N, "N"), moment=Limit(ZEROED_NM, "N m"))
 def unloaded_levels(context: RecordingContext) -> Iterator[Finding]:
     """Report P216: the unloaded reading of a plate in use, which has been subtracted from its loads."""
     plates = context.plates
@@ -98,7 +114,7 @@ def _zero(
         "P213",
         context.at(plate=name, **context.along(axis)),
         severity,
-        level_n=Quantity(level_n, "N", limit=_limit_n(_ZERO_N, context.adult_share), usual=(-3.0, 3.0)),
+        level_n=Quantity(level_n, "N", limit=_limit_n(_ZERO_N, context.adult_share), usual=_ZERO_N.usual),
         method=Quantity(method),
     )
 
@@ -117,6 +133,7 @@ def _steady_minimum(vertical: FloatArray, share: float) -> float | None:
     return None
 
 
+@check("P212", "P214", unless=needs.VELOCITY, of_one=_PLATE_ZERO_N, force=_FORCE_N, window=_WINDOW_S)
 def zeros_under_load(context: RecordingContext) -> Iterator[Finding]:
     """Report P212 and P214: zero offsets under load along each horizontal axis.
 
@@ -204,7 +221,7 @@ def _plate_zero(
     vertical_n = plates.force[:, best, 1]
     share = zero_offset_n / float(vertical_n[vertical_n > FIRM_LOAD_N].mean())
     evidence = {
-        "offset_n": Quantity(zero_offset_n, "N", limit=limit_n, usual=(-9.0, 9.0)),
+        "offset_n": Quantity(zero_offset_n, "N", limit=limit_n, usual=_PLATE_ZERO_N.usual),
         "share": Quantity(share, "1"),
         "velocity_residual_m_s": residual.evidence(zeroed, limit_m_s),
     }

@@ -4,15 +4,18 @@ from collections.abc import Iterator
 
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.suitability import GROUPS, SHOWN_SHARE, informed, prior_values
+from kinertia.diagnostics.runner import check
 from kinertia.estimation.forces_used import forces_used
 from kinertia.findings.finding import Finding, finding, with_evidence
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 
-_LEAST_SHARE = 0.01
+_LEAST_SHARE = Limit(0.01)
 """Frames with less weight, from which share on they are mentioned."""
 
 
+@check("R111", "R112", share=_LEAST_SHARE)
 def filters(context: ResultContext) -> Iterator[Finding]:
     """Report R111 and R112: a cutoff that was chosen (R111), and impacts that were given less weight (R112)."""
     for trial in context.fit.trials if context.fit.settings.cutoff_hz == "gcv" else ():
@@ -24,6 +27,7 @@ def filters(context: ResultContext) -> Iterator[Finding]:
             yield finding("R112", Where(trial=trial.name), share=Quantity(share, "1", limit=_LEAST_SHARE))
 
 
+@check("R402", "R403", "R404")
 def basis(context: ResultContext) -> Iterator[Finding]:
     """Report which part of the result rests on assumptions, or on the prior."""
     fit = context.fit

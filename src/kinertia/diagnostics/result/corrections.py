@@ -10,15 +10,22 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
-from kinertia.estimation.simultaneous.calibration_entry import DELAY, ZERO, CalibrationEntry
+from kinertia.diagnostics.runner import check
+from kinertia.estimation.simultaneous.calibration_entry import DELAY, NOTABLE, ZERO, CalibrationEntry
+from kinertia.estimation.simultaneous.instruments.priors import DELAY_PRIOR_S, TRIAL_DELAY_PRIOR_S, ZERO_PRIOR_N
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.skeleton import GRAVITY_M_S2
 
-_SD = 2.0
 _FEWEST = 2
 """Equal errors of so many plates may be the error of all: of a single plate it is its own."""
+
+
+def reported(prior_sd: float, unit: str) -> Limit:
+    """Return the limit of an instrument error with this prior SD: twice it; usual is what the prior expects."""
+    return Limit(NOTABLE * prior_sd, unit, usual=(-prior_sd, prior_sd))
 
 
 def corrected(
@@ -32,7 +39,7 @@ def correction(code: str, headline: str, where: Where, one: CalibrationEntry, la
     """Return an error's finding; `headline` names its main quantity. An error above `largest` is a WARNING."""
     unsure = not one.supported
     evidence = {
-        headline: Quantity(one.value, one.unit, _SD * one.prior_sd, (-one.prior_sd, one.prior_sd), one.sd),
+        headline: Quantity(one.value, one.unit, NOTABLE * one.prior_sd, (-one.prior_sd, one.prior_sd), one.sd),
         "moved": Quantity(one.moved or 0.0, "1", limit=1.0),
         "kind": Quantity("an apparent" if unsure else "a clear"),
         "condition": Quantity(" if other people's trials also show it" if unsure else ""),
@@ -49,10 +56,11 @@ def equal(errors: Sequence[CalibrationEntry], usual_sd: float = np.inf) -> bool:
     if len(errors) < _FEWEST or not all(one.found for one in errors):
         return False
     values = [one.value for one in errors]
-    usual = _SD * np.sqrt(2) * min(usual_sd, *(one.prior_sd for one in errors))
+    usual = NOTABLE * np.sqrt(2) * min(usual_sd, *(one.prior_sd for one in errors))
     return min(values) * max(values) > 0.0 and max(values) - min(values) <= usual
 
 
+@check("T214", "T215", delay=reported(DELAY_PRIOR_S.sd, "s"), trial_delay=reported(TRIAL_DELAY_PRIOR_S.sd, "s"))
 def delays(context: ResultContext) -> Iterator[Finding]:
     """Report the common delay of all forces, and the additional delays of several trials; of one trial its total.
 
@@ -68,6 +76,7 @@ def delays(context: ResultContext) -> Iterator[Finding]:
         )
 
 
+@check("P214", "P215", zero=reported(ZERO_PRIOR_N.sd, "N"))
 def zero_offsets(context: ResultContext) -> Iterator[Finding]:
     """Report zero offsets that were corrected, and those that all plates of a trial share: an unmeasured force."""
     zeros = [one for one in context.errors if one.quantity == ZERO]

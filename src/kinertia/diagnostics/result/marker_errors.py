@@ -13,10 +13,14 @@ import numpy as np
 from kinertia.diagnostics.evidence.body_centre import owners_of
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory, foot_trajectories
 from kinertia.diagnostics.result.context import ResultContext
-from kinertia.diagnostics.result.corrections import equal
+from kinertia.diagnostics.result.corrections import equal, reported
+from kinertia.diagnostics.runner import check
+from kinertia.estimation.joint_adaptation import BACKWARDS_RAD
 from kinertia.estimation.simultaneous.calibration_entry import AXIS, POSITION, CalibrationEntry
+from kinertia.estimation.simultaneous.instruments.model_uncertainty import JOINT_AXIS_SD_RAD
 from kinertia.estimation.trial_fit import TrialFit
 from kinertia.findings.finding import Finding, finding, with_evidence
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.anatomy import segment_of
@@ -26,23 +30,23 @@ from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, centre_of_pressure
 from kinertia.trial.data import FEET
 from kinertia.trial.sampled_time import within
 
-_MOVED_M = 0.03
+_MOVED_M = Limit(0.03, "m")
 """Skin moves markers up to some 30 mm."""
 _SHOULDER_M, _CLAVICLE_M = 0.12, 0.045
+_MOVED_AT_SHOULDER_M = Limit(_MOVED_M + _CLAVICLE_M, "m")
 """Markers so close to a shoulder joint move by as much more with the clavicle, while the arm is raised: its length
 times 17 degrees."""
-_DRIFTING = 3.0
+_DRIFTING = Limit(3.0)
 """Multiple of the usual SD from which a marker drifts, as in `marker_noise`."""
-_BACKWARDS_RAD = 0.5
-_TORSO_RAD = 0.25
+_TORSO_RAD = Limit(0.25, "rad")
 _SIDES = {"r": "right", "l": "left"}
 _ACROSS = "mediolateral"
-_FARTHER_M = 0.008
-_USUAL_M = (-0.007, 0.007)
+_FARTHER_M = Limit(0.008, "m", usual=(-0.007, 0.007))
 _CENTRE_HEIGHT = 0.55
 """Height of the body's centre of mass over stature."""
 
 
+@check("M162", "M163", moved=_MOVED_M, at_shoulder=_MOVED_AT_SHOULDER_M, drifting=_DRIFTING)
 def moved_markers(context: ResultContext) -> Iterator[Finding]:
     """Report markers that drift in a trial, and markers displaced in one trial compared with every other."""
     posterior = context.fit.posterior
@@ -56,7 +60,7 @@ def moved_markers(context: ResultContext) -> Iterator[Finding]:
             yield finding("M163", Where(trial=trial.name, markers=(label,)), sd_m=sd, usual_sd_m=Quantity(usual_m, "m"))
     for trial, distances in zip(context.fit.trials, posterior.marker_distances_m, strict=False):
         for label, away_m in distances.items():
-            limit_m = _MOVED_M + (_CLAVICLE_M if label in shoulders else 0.0)
+            limit_m = _MOVED_AT_SHOULDER_M if label in shoulders else _MOVED_M
             if away_m > limit_m:
                 away = Quantity(away_m, "m", limit=limit_m)
                 yield finding("M162", Where(trial=trial.name, markers=(label,)), difference_m=away)
@@ -83,12 +87,20 @@ def _at_shoulders(skeleton: Skeleton) -> set[str]:
     }
 
 
+@check(
+    "M171",
+    "M172",
+    "M175",
+    backwards=Limit(BACKWARDS_RAD, "rad"),
+    torso=_TORSO_RAD,
+    knee=reported(JOINT_AXIS_SD_RAD, "rad"),
+)
 def corrected_joints(context: ResultContext) -> Iterator[Finding]:
     """Report elbows that the static trial would bend backwards, a torso that arms would turn, and knees whose axis is
     elsewhere than in the static trial.
     """
     for side, rotation_rad in context.ready.elbow_rotations_rad.items():
-        rotation = Quantity(rotation_rad, "rad", limit=_BACKWARDS_RAD)
+        rotation = Quantity(rotation_rad, "rad")
         yield finding("M171", Where(part=f"{_SIDES[side]} elbow"), rotation_rad=rotation)
     if (torso_rad := context.ready.torso_rotation_rad) is not None:
         yield finding("M172", Where(part="torso"), rotation_rad=Quantity(torso_rad, "rad", limit=_TORSO_RAD))
@@ -111,6 +123,7 @@ def _calibrated(context: ResultContext) -> Sequence[CalibrationEntry]:
     return () if posterior is None else posterior.calibration
 
 
+@check("M145", farther=_FARTHER_M)
 def sideways_lean(context: ResultContext) -> Iterator[Finding]:
     """Report M145: an equal correction of all plates takes the loads away from both feet to one side."""
     across = [axis for axis in "xz" if context.along(axis, None).axis == _ACROSS]
@@ -126,8 +139,8 @@ def sideways_lean(context: ResultContext) -> Iterator[Finding]:
     lean_m = float(np.mean([abs(corrected - recorded) for recorded, corrected in beside]))
     height_m = context.ready.subject.height_m
     evidence = {
-        "lean_m": Quantity(lean_m, "m", usual=_USUAL_M),
-        "beside_m": Quantity((float(before), float(after)), "m", limit=_FARTHER_M, usual=_USUAL_M),
+        "lean_m": Quantity(lean_m, "m", usual=_FARTHER_M.usual),
+        "beside_m": Quantity((float(before), float(after)), "m", limit=_FARTHER_M, usual=_FARTHER_M.usual),
     }
     if height_m is not None:
         evidence["tilt_rad"] = Quantity(lean_m / (_CENTRE_HEIGHT * height_m), "rad")

@@ -3,18 +3,20 @@
 from collections.abc import Iterator
 
 from kinertia.diagnostics.result.context import ResultContext
+from kinertia.diagnostics.runner import check
 from kinertia.estimation.input_checks import mass_by_force_kg
 from kinertia.estimation.trial_fit import TrialFit
 from kinertia.findings.finding import Finding, finding
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.bsp import BodySegmentParameters
 
-_MOTION = 0.05
+_MOTION = Limit(0.05)
 """Masses by force may differ by this share between inverse kinematics and the marker-based centre of mass."""
-_TOTAL = 0.03
+_TOTAL = Limit(0.03)
 """Share by which the estimated total mass may differ from the stated one."""
-_IDENTIFIED_SD = 2.0
+_IDENTIFIED_SD = Limit(2.0)
 """SDs of its mass from which on an attached item differs from nothing."""
 
 
@@ -23,6 +25,7 @@ def mass_from_force_kg(literature: BodySegmentParameters, trial: TrialFit) -> fl
     return mass_by_force_kg(literature, trial.kinematics.foot_loads, trial.residuals["literature"])
 
 
+@check("R107", share=_MOTION)
 def forces_of_the_motion(context: ResultContext) -> Iterator[Finding]:
     """Report R107: trials whose forces give another body mass with the motion of inverse kinematics than with the
     markers'."""
@@ -41,6 +44,7 @@ def forces_of_the_motion(context: ResultContext) -> Iterator[Finding]:
             )
 
 
+@check("S113", share=_TOTAL)
 def total_mass(context: ResultContext) -> Iterator[Finding]:
     """Report S113: an estimated total mass that follows the plates more than the stated mass."""
     total_kg, stated = context.fit.estimate.total_mass_kg, context.ready.total_mass
@@ -53,6 +57,7 @@ def total_mass(context: ResultContext) -> Iterator[Finding]:
         )
 
 
+@check("S407", distance=_IDENTIFIED_SD)
 def attached_items(context: ResultContext) -> Iterator[Finding]:
     """Report S407: attached items of unknown mass that the trials cannot distinguish from zero."""
     estimate, posterior = context.fit.estimate, context.fit.posterior

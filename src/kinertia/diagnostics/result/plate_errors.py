@@ -33,41 +33,63 @@ from dataclasses import replace
 import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
-from kinertia.diagnostics.result.corrections import corrected, correction, equal
+from kinertia.diagnostics.result.corrections import corrected, correction, equal, reported
+from kinertia.diagnostics.runner import check
 from kinertia.estimation.free_moment_sign import VERTICAL, residual_moments_nm, residual_moments_without_offsets_nm
 from kinertia.estimation.simultaneous.calibration_entry import FREE_MOMENT, GAIN, POSITION, ROTATION, CalibrationEntry
 from kinertia.estimation.simultaneous.instruments.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS
-from kinertia.estimation.simultaneous.instruments.priors import InstrumentInformation, InstrumentPrior
+from kinertia.estimation.simultaneous.instruments.priors import (
+    FLOOR_PRIOR,
+    PLATE_PRIOR,
+    TRIAL_GAIN_PRIOR,
+    InstrumentInformation,
+    InstrumentPrior,
+)
 from kinertia.estimation.simultaneous.uncertainty.missing_load_evidence import SURE
 from kinertia.estimation.trial_fit import TrialFit
 from kinertia.findings.finding import Finding, finding, with_evidence
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 
+_POSITION_SD_M, _ROTATION_SD_RAD = (
+    float(np.hypot(PLATE_PRIOR[name].sd, FLOOR_PRIOR[name].sd)) for name in ("x", "turn")
+)
+"""Of a plate's own error and that of all plates together."""
+_TRIAL_GAIN_SD = float(np.hypot(PLATE_PRIOR["gain"].sd, TRIAL_GAIN_PRIOR.sd))
+"""Of a plate's gain in one trial."""
 _OPEN_M = 1.0
 _FIXED_M = 1e-6
 """Equal displacements of all plates and a displacement of the floor are the same: the floor is fixed."""
-_HARDLY_M = 0.004
-_BETTER = 0.7
+_HARDLY_M = Limit(0.004, "m")
+_BETTER = Limit(0.7)
 _CERTAIN = 2.0
 """SDs by which plates must differ."""
-_MATTERS_M = 0.015
+_MATTERS_M = Limit(0.015, "m")
 """Of three walks that show 19 mm sideways, two do not show plates displaced by 20 mm: their moments err by 5 N m."""
-_MATTERS_RAD = float(np.radians(2.0))
+_MATTERS_RAD = Limit(np.radians(2.0), "rad")
 """In the least informative walk of the reference recordings, 3 degrees change joint moments by twice their SDs."""
-_OF_ONE_MATTERS_RAD = float(np.radians(4.0))
+_OF_ONE_MATTERS_RAD = Limit(np.radians(4.0), "rad")
 """In reference walks, 5 degrees of one plate change joint moments by one to two SDs."""
-_LARGEST_RAD = float(np.radians(10.0))
+_LARGEST_RAD = Limit(np.radians(10.0), "rad")
 """Three prior SDs of a rotated plate. A larger estimate points to another fault, which no rotation corrects."""
 _AMPLIFIER = "a calibration, amplifier or unit that all plates have in common"
 _MORE = ("something worn or carried that the stated mass leaves out", "a wrong stated mass", _AMPLIFIER)
 _LESS = ("a wrong stated mass", "support that no plate measures (handrail, walker, crutches, harness)", _AMPLIFIER)
-_LESS_REVERSED = 0.8
+_LESS_REVERSED = Limit(0.8)
 """Share of the residual as measured, below which the residual with the sign reversed speaks against the sign."""
 _ONE_SIDED = 0.5
 """Share of the errors' sizes above which their sum is not that of mirror images."""
 
 
+@check(
+    "P246",
+    "P247",
+    position=reported(_POSITION_SD_M, "m"),
+    difference=Limit(_CERTAIN * PLATE_PRIOR["x"].sd, "m"),
+    better=_BETTER,
+    hardly=_HARDLY_M,
+)
 def plate_positions(context: ResultContext) -> Iterator[Finding]:
     """Report corrected plate positions, as one finding where all plates are displaced equally, and directions in which
     another plate may be the displaced one.
@@ -136,6 +158,7 @@ def position_deviations(shown: InstrumentInformation, prior: InstrumentPrior, ax
     return float(apart), float(np.sqrt(covariance.mean()))
 
 
+@check("P248", matters=_MATTERS_M)
 def common_offset(context: ResultContext) -> Iterator[Finding]:
     """Report axes along which a displacement of all plates that matters would go unnoticed."""
     if context.fit.posterior is None:
@@ -147,6 +170,15 @@ def common_offset(context: ResultContext) -> Iterator[Finding]:
             yield finding("P248", context.along(axis, None), detectable_m=Quantity(least_m, "m", limit=_MATTERS_M))
 
 
+@check(
+    "P234",
+    "P235",
+    "P237",
+    rotation=reported(_ROTATION_SD_RAD, "rad"),
+    largest=_LARGEST_RAD,
+    of_all=_MATTERS_RAD,
+    of_one=_OF_ONE_MATTERS_RAD,
+)
 def plate_rotation(context: ResultContext) -> Iterator[Finding]:
     """Report rotations that were corrected, of all plates or of one, and one too small for these trials to show."""
     rotations = [one for one in context.errors if one.quantity == ROTATION]
@@ -195,6 +227,7 @@ def _smallest(shown: InstrumentInformation, prior: InstrumentPrior, place: int) 
     return unknowns[place].smallest_detectable(deviation)
 
 
+@check("P223", "P224", gain=reported(PLATE_PRIOR["gain"].sd, "1"), trial_gain=reported(_TRIAL_GAIN_SD, "1"))
 def gains(context: ResultContext) -> Iterator[Finding]:
     """Report gain errors that were corrected, and one that all plates share, in all trials or in one."""
     errors = [one for one in context.errors if one.quantity == GAIN]
@@ -210,6 +243,7 @@ def gains(context: ResultContext) -> Iterator[Finding]:
             yield _of_all(context, own)
 
 
+@check("P288", log_odds=Limit(SURE))
 def missing_loads(context: ResultContext) -> Iterator[Finding]:
     """Report P288: plates of whose loads a part is missing, which is no error of their gain."""
     posterior = context.fit.posterior
@@ -244,6 +278,9 @@ def _certain(errors: Sequence[CalibrationEntry]) -> Iterator[CalibrationEntry]:
             yield one
 
 
+@check(
+    "P260", "P265", "P267", "P268", "P269", error=reported(PLATE_PRIOR["free moment"].sd, "N m/N"), less=_LESS_REVERSED
+)
 def free_moments(context: ResultContext) -> Iterator[Finding]:
     """Report a wrong sign of the free moments, and the errors that remain once it is right."""
     posterior = context.fit.posterior

@@ -1,4 +1,4 @@
-"""Lists the checks of an estimate, and of a result, in the order in which they run."""
+"""Lists the checks of an estimate, and of a result, as a list."""
 
 from kinertia.diagnostics.result.basis import basis, filters
 from kinertia.diagnostics.result.context import ResultContext
@@ -19,27 +19,27 @@ from kinertia.diagnostics.runner import Check, asked
 from kinertia.findings.finding import Finding
 
 ESTIMATE_CHECKS: tuple[Check[ResultContext], ...] = (
-    Check("R10", forces_of_the_motion),
-    Check("R20", soundness),
-    Check("P21", zero_offsets),
-    Check("P22", gains),
-    Check("P28", missing_loads),
-    Check("P23", plate_rotation),
-    Check("P24", plate_positions),
-    Check("P24", common_offset),
-    Check("M14", sideways_lean),
-    Check("P26", free_moments),
-    Check("T21", delays),
-    Check("M16", moved_markers),
-    Check("M17", corrected_joints),
-    Check("S11", total_mass),
-    Check("S40", attached_items),
-    Check("R11", filters),
+    forces_of_the_motion,
+    soundness,
+    zero_offsets,
+    gains,
+    missing_loads,
+    plate_rotation,
+    plate_positions,
+    common_offset,
+    sideways_lean,
+    free_moments,
+    delays,
+    moved_markers,
+    corrected_joints,
+    total_mass,
+    attached_items,
+    filters,
 )
 RESULT_CHECKS: tuple[Check[ResultContext], ...] = (
-    Check("R30", residuals),
-    Check("R30", joint_angles),
-    Check("R40", basis),
+    residuals,
+    joint_angles,
+    basis,
 )
 
 

@@ -20,8 +20,10 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
+from kinertia.diagnostics.runner import check
 from kinertia.estimation.trial_fit import TrialFit
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.anatomy import segment_of
@@ -29,10 +31,14 @@ from kinertia.model.coordinate_range import TOLERANCE_DEG, UNKNOWN
 from kinertia.model.neutral_joints import centre_offsets
 from kinertia.trial.rms import rms, rms_by_marker
 
-_IMPOSSIBLE_RAD = float(np.radians(TOLERANCE_DEG))
+_IMPOSSIBLE_RAD = Limit(np.radians(TOLERANCE_DEG), "rad")
 """Excess beyond the range of any person."""
 _SURE = 2.0
 """SDs of an estimated angle."""
+
+
+def _limits(unit: str, rms_: float, peak: float) -> tuple[Limit, Limit]:
+    return Limit(rms_, unit, source=_GUIDELINE), Limit(peak, unit, source=_GUIDELINE)
 
 
 class Guideline(NamedTuple):
@@ -40,17 +46,18 @@ class Guideline(NamedTuple):
 
     code: str
     unit: str
-    good: tuple[float, float]
-    acceptable: tuple[float, float]
+    good: tuple[Limit, Limit]
+    acceptable: tuple[Limit, Limit]
 
 
-FORCE = Guideline("R301", "N", (5.0, 10.0), (10.0, 25.0))
-MOMENT = Guideline("R302", "N m", (30.0, 50.0), (50.0, 75.0))
-HARMLESS_N_PER_KG = 0.11
+_GUIDELINE = "OpenSim's guideline (Hicks et al. 2015)"
+FORCE = Guideline("R301", "N", _limits("N", 5.0, 10.0), _limits("N", 10.0, 25.0))
+MOMENT = Guideline("R302", "N m", _limits("N m", 30.0, 50.0), _limits("N m", 50.0, 75.0))
+HARMLESS_N_PER_KG = Limit(0.11, "N")
 """RMS residual force per body mass up to which joint moments are right within what matters clinically."""
-PEAK_FORCE_SHARE = 0.05
+PEAK_FORCE_SHARE = Limit(0.05, source=_GUIDELINE)
 """Largest share of the peak external force that the peak residual force may have."""
-GOOD_MARKERS_M, ACCEPTABLE_MARKERS_M = 0.012, 0.020
+GOOD_MARKERS_M, ACCEPTABLE_MARKERS_M = Limit(0.012, "m"), Limit(0.020, "m", source=_GUIDELINE)
 """RMS distance of the markers: OpenSim's guideline for inverse kinematics is 20 mm."""
 _LEGS = ("pelvis", "thigh", "shank", "foot")
 _WORST_MARKERS = 3
@@ -58,6 +65,24 @@ _WRONG_MODEL_M = 0.045
 """RMS distance that markers of a fault-free model exceed on no person, wherever they are attached."""
 
 
+@check(
+    "R301",
+    "R302",
+    "R303",
+    "R304",
+    rms_force=FORCE.good[0],
+    peak_force=FORCE.good[1],
+    acceptable_rms_force=FORCE.acceptable[0],
+    acceptable_peak_force=FORCE.acceptable[1],
+    harmless=HARMLESS_N_PER_KG,
+    rms_moment=MOMENT.good[0],
+    peak_moment=MOMENT.good[1],
+    acceptable_rms_moment=MOMENT.acceptable[0],
+    acceptable_peak_moment=MOMENT.acceptable[1],
+    share=PEAK_FORCE_SHARE,
+    markers=GOOD_MARKERS_M,
+    acceptable_markers=ACCEPTABLE_MARKERS_M,
+)
 def residuals(context: ResultContext) -> Iterator[Finding]:
     """Check the residual force and moment of every trial, and the distance of its markers."""
     for trial in context.fit.trials:
@@ -147,6 +172,7 @@ def _markers(context: ResultContext, trial: TrialFit) -> Iterator[Finding]:
     )
 
 
+@check("R305", impossible=_IMPOSSIBLE_RAD)
 def joint_angles(context: ResultContext) -> Iterator[Finding]:
     """Report R305: every coordinate that leaves its range in a trial, with its most extreme angle.
 

@@ -6,10 +6,11 @@ import numpy as np
 
 from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
 from kinertia.findings.finding import Finding, finding
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 
-_APART_SD = 3.0
+APART_SD = Limit(3.0)
 
 
 def session_contradictions(
@@ -25,13 +26,13 @@ def session_contradictions(
     for one in own:
         other = by_others.get(one.key, one)
         apart_sd = float(np.hypot(one.sd, other.sd))
-        if abs(one.value - other.value) > _APART_SD * apart_sd:
+        if abs(one.value - other.value) > APART_SD * apart_sd:
             yield finding(
                 "S501",
                 Where(plate=one.plate, part=f"{one} by {person}"),
                 error=Quantity(one.value, one.unit, sd=one.sd),
                 other_error=Quantity(other.value, one.unit, sd=other.sd),
-                sd=Quantity(apart_sd, one.unit, limit=_APART_SD * apart_sd),
+                sd=Quantity(apart_sd, one.unit, limit=APART_SD * apart_sd),
                 person=Quantity(person),
                 instrument=Quantity(str(one)),
             )

@@ -9,26 +9,28 @@ from collections.abc import Iterator
 import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
+from kinertia.diagnostics.runner import check
 from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import UNLIKE_CHANCE, OneSided, Unlikeness
 from kinertia.findings.display import first_few
 from kinertia.findings.finding import Finding, Severity, finding
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.anatomy import segment_of
 from kinertia.model.bsp import PARAMETERS, impossible_segments
 
-CONTRADICTION_SD = 3.0
+CONTRADICTION_SD = Limit(3.0)
 """Prior SDs from which on a parameter contradicts what was expected."""
-PLAIN_CONTRADICTION_SD = 4.0
+PLAIN_CONTRADICTION_SD = Limit(4.0)
 """A parameter this many prior SDs from its expected value is wrong by itself: the probability by chance is one in 16
 000."""
-MOST_DOUBTED_SEGMENTS = 2
+MOST_DOUBTED_SEGMENTS = Limit(2)
 """Segments with a parameter beyond CONTRADICTION_SD that are taken with care; more contradict the whole model."""
-CONTRADICTING_COM_M = 0.1
+CONTRADICTING_COM_M = Limit(0.1, "m")
 """A centre of mass this far from the literature contradicts it, if no prior states the variation between people: 34 mm
 (SD) for a trunk."""
-_ONE_SIDED_SD = 4.0
+_ONE_SIDED_SD = Limit(4.0)
 """As in `one_sided`."""
 _ARMS = ("upper_arm", "forearm", "hand")
 _WRONG = "a misplaced marker or joint centre, or an error of a plate"
@@ -36,6 +38,19 @@ _WORN = "something worn or carried that was not declared ([[attached]])"
 _OTHER = "a body that the tables do not describe (age_years, population under [subject])"
 
 
+@check(
+    "R201",
+    "R202",
+    "R203",
+    "R204",
+    "R205",
+    distance=CONTRADICTION_SD,
+    plain=PLAIN_CONTRADICTION_SD,
+    segments=MOST_DOUBTED_SEGMENTS,
+    centre=CONTRADICTING_COM_M,
+    chance=Limit(UNLIKE_CHANCE),
+    asymmetry=_ONE_SIDED_SD,
+)
 def soundness(context: ResultContext) -> Iterator[Finding]:
     """Report what contradicts the estimate as a whole, or single parameters."""
     fit = context.fit

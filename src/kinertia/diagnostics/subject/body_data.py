@@ -15,10 +15,12 @@ import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.person_context import PersonContext
+from kinertia.diagnostics.runner import check
 from kinertia.diagnostics.subject.mass import weighed_as_stated
 from kinertia.estimation.population import population_of
 from kinertia.findings.display import first_few
 from kinertia.findings.finding import Finding, Severity, finding
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.gait27 import ARM_COORDINATES, VIRTUAL_TRUNK
@@ -27,16 +29,18 @@ from kinertia.model.marker_set import in_words
 from kinertia.model.skeleton import Skeleton
 from kinertia.settings import Subject
 
-_SAME = 0.01
+_SAME = Limit(0.01)
 _QUANTITIES = {"mass_kg": ("mass", "kg"), "height_m": ("stature", "m")}
 _PARTS = (("ankle_lateral", "knee_lateral"), ("knee_lateral", "asis"), ("asis", "acromion"))
-_USUAL, _OFF = 0.815, 0.055
-_POSSIBLE = (0.65, 1.0)
+_USUAL = 0.815
+_SHORT, _LONG = Limit(0.76, usual=(0.79, 0.84)), Limit(0.87, usual=(0.79, 0.84))
+_SHORTEST, _LONGEST = Limit(0.65), Limit(1.0)
 """Nobody is shorter than from ankle to shoulder, or has a third of the stature above shoulders and below ankles."""
 _UPRIGHT = "upright on the pelvis, with literature values"
 _HANGING = "hanging straight down from the trunk, which carries them"
 
 
+@check("S103", same=_SAME)
 def stated_and_filed(context: PersonContext) -> Iterator[Finding]:
     """Report S103: a mass or stature in files that differs from the one used; not reported where the plates confirm
     that one."""
@@ -60,6 +64,7 @@ def stated_and_filed(context: PersonContext) -> Iterator[Finding]:
             )
 
 
+@check("S401")
 def population(context: PersonContext) -> Iterator[Finding]:
     """Report S401: a population that the anthropometric tables do not describe."""
     body_kg = None if context.total_mass is None else context.total_mass.body_kg
@@ -68,6 +73,7 @@ def population(context: PersonContext) -> Iterator[Finding]:
         yield assumed
 
 
+@check("M105")
 def absent_markers(context: PersonContext) -> Iterator[Finding]:
     """Report M105: markers of the static trial, or else of the model, that a trial lacks."""
     if context.marker_set is None:
@@ -89,6 +95,7 @@ def stated_ranges(subject: Subject) -> Iterator[Finding]:
         yield finding("S411", Where(part=name), range_rad=Quantity((low, high), "rad"))
 
 
+@check("S104", short=_SHORT, long=_LONG, shortest=_SHORTEST, longest=_LONGEST)
 def stature(context: RecordingContext) -> Iterator[Finding]:
     """Report S104: a stature that the landmarks of a static trial contradict."""
     height_m = context.height_m
@@ -104,10 +111,10 @@ def stature(context: RecordingContext) -> Iterator[Finding]:
         return
     length_m = float(np.mean(lengths))
     share = length_m / height_m
-    if abs(share - _USUAL) <= _OFF:
+    if _SHORT <= share <= _LONG:
         return
-    limit = _USUAL + _OFF * float(np.sign(share - _USUAL))
-    possible = _POSSIBLE[0] <= share <= _POSSIBLE[1]
+    limit = _SHORT if share < _SHORT else _LONG
+    possible = _SHORTEST <= share <= _LONGEST
     yield finding(
         "S104",
         context.at(),
@@ -115,7 +122,7 @@ def stature(context: RecordingContext) -> Iterator[Finding]:
         stated_m=Quantity(height_m, "m"),
         implied_m=Quantity(length_m / _USUAL, "m"),
         length_m=Quantity(length_m, "m"),
-        share=Quantity(share, "1", limit=limit, usual=(0.79, 0.84)),
+        share=Quantity(share, "1", limit=limit, usual=limit.usual),
     )
 
 

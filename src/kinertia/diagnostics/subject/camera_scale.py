@@ -18,16 +18,18 @@ import numpy as np
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.segment_distances import FEWEST_PAIRS, SAME_SESSION_M, SegmentDistances
 from kinertia.diagnostics.person_context import PersonContext, odd_ones
+from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, finding
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.trial.rms import rms
 
-AGAINST_STANDING = -0.0045
+AGAINST_STANDING = Limit(-0.0045)
 """Usual share by which distances are longer in motion than in a standing trial."""
-_FAR_M = 0.08
+FAR_M = Limit(0.08, "m")
 """Skin that moves a marker by 1 mm makes more than 1 % of a shorter distance."""
-_OTHER_SCALE, _ERRORS = 0.01, 3.0
+OTHER_SCALE, ERRORS = Limit(0.01, usual=(-0.004, 0.004)), Limit(3.0)
 """Distances are longer or shorter than usual by more than this share, and by more standard errors."""
 _ALIKE = 2.0 / 3.0
 """Smallest share of the segments that differ in the same direction."""
@@ -61,7 +63,7 @@ class CameraScale:
     @property
     def differs(self) -> bool:
         """Whether a different camera scale is the likeliest explanation."""
-        far = abs(self.error) > max(_OTHER_SCALE, _ERRORS * self.se)
+        far = abs(self.error) > max(OTHER_SCALE, ERRORS * self.se)
         alike = self.alike >= _ALIKE * self.segments and self.shown >= _SHOWN
         return far and alike and self.residual_m <= SAME_SESSION_M
 
@@ -70,7 +72,7 @@ class CameraScale:
         return finding(
             "S205",
             Where(trial=trial),
-            scale_error=Quantity(sign * self.error, "1", limit=_OTHER_SCALE, usual=(-0.004, 0.004), sd=self.se),
+            scale_error=Quantity(sign * self.error, "1", limit=OTHER_SCALE, usual=OTHER_SCALE.usual, sd=self.se),
             segments=Quantity(self.alike, "1"),
             pairs=Quantity(self.pairs, "1"),
             reference=Quantity(reference),
@@ -85,6 +87,7 @@ def camera_scale(distances: SegmentDistances, usual: float) -> CameraScale | Non
     return scale if scale is not None and scale.differs else None
 
 
+@check("S205", apart=FAR_M, scale=OTHER_SCALE, errors=ERRORS, standing=AGAINST_STANDING)
 def trial_scales(context: PersonContext) -> Iterator[Finding]:
     """Report S205: of two trials with different scales, the one that the static trial and other trials contradict, or
     both where neither is contradicted.
@@ -103,7 +106,7 @@ def trial_scales(context: PersonContext) -> Iterator[Finding]:
         scale = between(first, other)
         if scale is None or not scale.differs:
             continue
-        further = [(one, AGAINST_STANDING) for one in context.standing]
+        further: list[tuple[RecordingContext, float]] = [(one, AGAINST_STANDING) for one in context.standing]
         further += [(one, 0.0) for one in context.trials if one not in (first, other)]
         witnesses = [(size(between(one, first, usual)), size(between(one, other, usual))) for one, usual in further]
         for odd in odd_ones(first, other, witnesses):
@@ -113,7 +116,7 @@ def trial_scales(context: PersonContext) -> Iterator[Finding]:
 
 def _scale(distances: SegmentDistances, usual: float) -> CameraScale | None:
     before, after = distances.lengths()
-    far = before > _FAR_M
+    far = before > FAR_M
     if far.sum() < FEWEST_PAIRS:
         return None
     shares = (after / before)[far] - 1.0

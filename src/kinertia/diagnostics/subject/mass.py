@@ -14,16 +14,18 @@ from itertools import combinations
 
 import numpy as np
 
-from kinertia.diagnostics.evidence.force_mass import MISSING, ForceMass, UnmeasuredSupport
+from kinertia.diagnostics.evidence.force_mass import MISSING, MOSTLY, UNMEASURED_S, ForceMass, UnmeasuredSupport
 from kinertia.diagnostics.person_context import PersonContext, odd_ones
+from kinertia.diagnostics.runner import check
 from kinertia.estimation.total_mass import TotalMass
 from kinertia.findings.finding import Finding, Severity, finding
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.trial.data import PlateLoads
 
-WARNING_SHARE, ERROR_SHARE, AGREED_SHARE = 0.02, 0.10, 0.05
+WARNING_SHARE, ERROR_SHARE, AGREED_SHARE = Limit(0.02), Limit(0.10), Limit(0.05)
 """Stated mass and vertical force may differ by this share and twice the SD of the difference; by the last one, where
 several occasions agree that they do."""
 _SAME = 0.04
@@ -37,7 +39,7 @@ _SINGLE_SUPPORT = 0.04
 m/s."""
 _LOAD_KG = 2.0
 """Smallest surplus that may be something worn or carried."""
-_POUND, _UNIT_OFF = 0.45359, 0.1
+_POUND, _UNIT_OFF = 0.45359, Limit(0.1)
 """A ratio of force to stated mass within this share of a ratio of units is likelier that of units than of people."""
 _FORCE_UNITS = {"kilograms-force": 1.0 / GRAVITY_M_S2, "pounds-force": 0.2248, "kN": 0.001}
 
@@ -72,6 +74,19 @@ class _Occasion:
         return abs(self.mass_kg - total.total_kg) > self.allowed_kg(total, share)
 
 
+@check(
+    "S111",
+    "S112",
+    "P202",
+    "P281",
+    share=WARNING_SHARE,
+    error=ERROR_SHARE,
+    agreed=AGREED_SHARE,
+    unit=_UNIT_OFF,
+    missing=MISSING,
+    missing_for=UNMEASURED_S,
+    complete=MOSTLY,
+)
 def stated_mass(context: PersonContext) -> Iterator[Finding]:
     """Report S111, S112 and P281: S111 and S112 where the stated mass contradicts the plates, P281 where part of the
     weight is off the plates for a while.
@@ -109,6 +124,7 @@ def weighed_as_stated(context: PersonContext, other_kg: float) -> bool:
     )
 
 
+@check("S306", share=ERROR_SHARE)
 def masses_of_trials(context: PersonContext) -> Iterator[Finding]:
     """Report S306: of two trials whose forces give different masses, the one that static trial, other trials and stated
     mass contradict.

@@ -12,13 +12,15 @@ import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.person_context import PersonContext
+from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, finding
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import BoolArray, Markers
 from kinertia.trial.sampled_time import runs, span_s
 from kinertia.trial.trial_input import Task
 
-SWAY_RAD, SQUAT_M = float(np.radians(12.0)), 0.15
+SWAY_RAD, SQUAT_M = Limit(np.radians(12.0), "rad", usual=(0.0, np.radians(5.0))), Limit(0.15, "m", usual=(0.0, 0.08))
 """A walking trunk leans by up to 5 degrees from its mean; a walking pelvis moves up and down by up to 0.08 m."""
 _FLIGHT_S = 0.03
 """Shortest flight of a run; contacts by markers are uncertain by about as much."""
@@ -82,6 +84,7 @@ class InformativeMovements:
         )
 
 
+@check("S312", sway=SWAY_RAD, squat=SQUAT_M)
 def informative_movements(context: PersonContext) -> Iterator[Finding]:
     """Report S312: no trial with forces shows trunk sway, or none shows squats."""
     measured = [movements_of(one) for one in context.trials if one.plates is not None]

@@ -17,23 +17,25 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.label_exchange import swapped_labels
 from kinertia.diagnostics.evidence.segment_distances import FEWEST_PAIRS, SAME_SESSION_M, SegmentDistances
 from kinertia.diagnostics.person_context import PersonContext, odd_ones
-from kinertia.diagnostics.subject.camera_scale import AGAINST_STANDING, camera_scale
+from kinertia.diagnostics.runner import check
+from kinertia.diagnostics.subject.camera_scale import AGAINST_STANDING, ERRORS, FAR_M, OTHER_SCALE, camera_scale
 from kinertia.findings.finding import Finding, finding
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import Recording
 from kinertia.trial.rms import rms
 
-_OTHER_PERSON = 0.05
+_OTHER_PERSON = Limit(0.05, usual=(-0.012, 0.012))
 """Median share by which the distances may differ."""
-_REAPPLIED_M, _TYPICAL_BEYOND_M, _CERTAIN, _OF_MEDIAN = 0.0141, 0.012, 4.0, 1.25
+_REAPPLIED_M, _TYPICAL_BEYOND_M, _CERTAIN, _OF_MEDIAN = Limit(0.0141, "m"), Limit(0.012, "m"), Limit(4.0), 1.25
 """RMS and median difference, standard errors, and the error of a median over that of a mean. Markers re-applied 10 mm
 away along each axis change a distance by the first; the RMS over the distances of a dozen markers is then up to 24 mm,
 and their median share up to 10 %."""
-_OTHER_MASS, _OTHER_STATURE = 0.05, 0.03
+_OTHER_MASS, _OTHER_STATURE = Limit(0.05), Limit(0.03)
 """Shares by which mass and stature of two recordings differ for them not to be of one person in one session."""
-_MOVED_M, _MOVED_BETWEEN_M, _MOVED_SHARE = 0.03, 0.04, 0.15
+_MOVED_M, _MOVED_BETWEEN_M, _MOVED_SHARE = Limit(0.03, "m", usual=(0.0, 0.017)), Limit(0.04, "m"), Limit(0.15)
 """Difference of a distance where a marker was moved: from a static trial; between trials, where soft thighs
 change shape, a length and a share."""
 _MOST_MOVED = 3
@@ -41,6 +43,27 @@ _MOST_MOVED = 3
 Span = tuple[float, float] | None
 
 
+@check(
+    "L212",
+    "M161",
+    "S203",
+    "S204",
+    "S205",
+    ratio=_OTHER_PERSON,
+    reapplied=_REAPPLIED_M,
+    typical=_TYPICAL_BEYOND_M,
+    certain=_CERTAIN,
+    session=SAME_SESSION_M,
+    mass=_OTHER_MASS,
+    stature=_OTHER_STATURE,
+    moved=_MOVED_M,
+    moved_between=_MOVED_BETWEEN_M,
+    moved_share=_MOVED_SHARE,
+    apart=FAR_M,
+    scale=OTHER_SCALE,
+    errors=ERRORS,
+    standing=AGAINST_STANDING,
+)
 def static_and_trials(context: PersonContext) -> Iterator[Finding]:
     """Report L212, S203, S205, M161 and S204: swapped labels (L212), another person (S203), another camera scale
     (S205), moved (M161) or re-applied markers (S204) in trials, compared with the static trial.
@@ -68,6 +91,7 @@ def static_and_trials(context: PersonContext) -> Iterator[Finding]:
                 )
 
 
+@check("M161", "S305", ratio=_OTHER_PERSON, moved=_MOVED_M, moved_between=_MOVED_BETWEEN_M, moved_share=_MOVED_SHARE)
 def trials_of_one_person(context: PersonContext) -> Iterator[Finding]:
     """Report S305 and M161: two trials of different people (S305), or with a marker that was moved in between (M161);
     of the two, the one that static trial and other trials contradict, or both where neither is contradicted.
@@ -119,7 +143,7 @@ def _against(
         yield finding(
             "S204",
             Where(trial=at),
-            rms_m=Quantity(rms_m, "m", limit=SAME_SESSION_M, usual=(0.0, 0.0046)),
+            rms_m=Quantity(rms_m, "m", limit=SAME_SESSION_M, usual=SAME_SESSION_M.usual),
             worst_pair=Quantity(distances.worst_pair()),
             reference=Quantity(called),
         )
@@ -153,7 +177,7 @@ def _other_person(
         "S203",
         Where(trial=at),
         ratio=Quantity(ratio, "1", limit=1.0 + _OTHER_PERSON * float(np.sign(ratio - 1.0)), usual=(0.988, 1.012)),
-        rms_m=Quantity(rms_m, "m", limit=SAME_SESSION_M if data else beyond_m, usual=(0.0, 0.0046)),
+        rms_m=Quantity(rms_m, "m", limit=SAME_SESSION_M if data else beyond_m, usual=SAME_SESSION_M.usual),
         pairs=Quantity(len(distances.pairs), "1"),
         worst_m=Quantity(float(off[np.argmax(np.abs(off))]), "m"),
         reference=Quantity(called),
@@ -228,7 +252,7 @@ def _moved_findings(moved: Sequence[_Moved], at: str, called: str) -> Iterator[F
         yield finding(
             "M161",
             Where(trial=at, markers=one.labels),
-            difference_m=Quantity(one.difference_m, "m", limit=_MOVED_M, usual=(0.0, 0.017)),
+            difference_m=Quantity(one.difference_m, "m", limit=_MOVED_M, usual=_MOVED_M.usual),
             to_marker=Quantity(one.to_marker),
             reference=Quantity(called),
         )
@@ -277,6 +301,7 @@ def _joined(found: Sequence[Sequence[Finding]]) -> Iterator[Finding]:
     yield from merged.values()
 
 
+@check("S302", "S303")
 def repeated_trials(context: PersonContext) -> Iterator[Finding]:
     """Report S302 and S303: two trials whose markers (S302) or forces (S303) are identical over times that overlap."""
     for first, other in combinations(context.trials, 2):

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.person_context import PersonContext
+from kinertia.diagnostics.runner import check
 from kinertia.diagnostics.subject.movements import task_of
 from kinertia.findings.finding import Finding, with_evidence
 from kinertia.findings.quantity import Quantity
@@ -20,6 +21,7 @@ def coverage_of(context: RecordingContext) -> tuple[LegCoverage, ...]:
     return leg_coverage(trial, trial.known_legs)
 
 
+@check("P272", "P289")
 def stance_coverage(context: PersonContext) -> Iterator[Finding]:
     """Report P272: a phase of a leg's stance is on plates in no trial of a task; P289: hardly anything of it is.
 

@@ -8,32 +8,33 @@ import numpy as np
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.plates.plate_height import heights_on_plates
+from kinertia.diagnostics.runner import check
 from kinertia.estimation.simultaneous.instruments.model_uncertainty import JOINT_CENTRE_SD_M, WITHOUT_STATIC
 from kinertia.findings.finding import Finding, Severity, finding
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.motion.stance_pose import hidden_landmarks
-from kinertia.trial.marker_quality import still_span_s
+from kinertia.trial.marker_quality import LEAST_WALK_M, STANDING_RANGE_M, still_span_s
 
-_LOWEST_M = (0.005, 0.050)
+_LOWEST_M, _HIGHEST_M = Limit(0.005, "m", usual=(0.023, 0.044)), Limit(0.050, "m")
 """A marker's own radius is 5 mm and more: one beside a small toe was 5.7 mm above the floor. Soles are under both feet,
 and markers on the side of a foot are low.
 
-On top of shoes markers are 53 to 60 mm above the floor while standing, but 44 to 48 mm in motion.
+Usual is what fourteen people of eight laboratories have, barefoot and in running shoes. On top of shoes markers are 53
+to 60 mm above the floor while standing, but 44 to 48 mm in motion.
 """
-_USUAL_LOWEST_M = (0.023, 0.044)
-"""Usual height of the lowest marker, from fourteen people of eight laboratories, barefoot and in running shoes."""
-_FLAT_M = 0.04
+_FLAT_M = Limit(0.04, "m", usual=(0.0, 0.012))
 """Heels, and metatarsals, of seven people who stand are up to 12 mm higher on one side than on the other."""
-_WALK_M = 0.5
 _WHILE_STANDING, _IN_MOTION = 50.0, 10.0
 """Percentiles of a marker's height: in motion it is as high as on standing feet for a part of the time only."""
 
 
+@check("S201", walk=Limit(LEAST_WALK_M, "m"))
 def standing(context: RecordingContext) -> Iterator[Finding]:
     """Report S201: a person who walks in the static trial, with the part in which they stand."""
     if context.travel.kind != "walks":
         return
-    distance = Quantity(context.travel.distance_m, "m", limit=_WALK_M, usual=(0.0, 0.03))
+    distance = Quantity(context.travel.distance_m, "m", limit=LEAST_WALK_M, usual=(0.0, STANDING_RANGE_M))
     span = still_span_s(context.markers)
     action = "Give the standing trial, or none"
     if span is not None:
@@ -41,6 +42,7 @@ def standing(context: RecordingContext) -> Iterator[Finding]:
     yield finding("S201", context.at(span_s=span), distance_m=distance, action=Quantity(action))
 
 
+@check("S207", "S208")
 def no_static(context: PersonContext) -> Iterator[Finding]:
     """Report S207: there is neither a static trial nor a model, and a walk replaces them; S208: no walk can."""
     unread = any(one.rule.stage == "file" and one.where.trial is None for one in context.found)
@@ -52,6 +54,7 @@ def no_static(context: PersonContext) -> Iterator[Finding]:
         yield finding("S208", landmarks=Quantity(", ".join(hidden)))
 
 
+@check("M143", lowest=_LOWEST_M, highest=_HIGHEST_M)
 def floor(context: PersonContext) -> Iterator[Finding]:
     """Report M143: feet that stand above or below the floor, by the lowest marker of toes, metatarsals and heels.
 
@@ -63,12 +66,12 @@ def floor(context: PersonContext) -> Iterator[Finding]:
     if static is None or lowest is None:
         return
     label, height_m = lowest
-    low, high = _LOWEST_M
+    low, high = _LOWEST_M, _HIGHEST_M
     if low <= height_m <= high:
         return
     in_trials = [own for trial in context.trials for own in _heights_in_motion(trial)]
     shared = all(own_m < low if height_m < low else own_m > high for own_m in in_trials)
-    height = Quantity(height_m, "m", limit=low if height_m < low else high, usual=_USUAL_LOWEST_M)
+    height = Quantity(height_m, "m", limit=low if height_m < low else high, usual=_LOWEST_M.usual)
     found = finding("M143", static.at(markers=(label,)), height_m=height)
     yield found if shared else replace(found, severity=Severity.INFO)
 
@@ -97,6 +100,7 @@ def _lowest(context: RecordingContext, percentile: float) -> tuple[str, float] |
     return labels[lowest], float(each[lowest])
 
 
+@check("S202", apart=_FLAT_M)
 def flat_feet(context: RecordingContext) -> Iterator[Finding]:
     """Report S202: a foot that is not on the floor like the other; foot axes assume that the foot is flat on the
     floor."""
@@ -116,6 +120,6 @@ def flat_feet(context: RecordingContext) -> Iterator[Finding]:
         yield finding(
             "S202",
             context.at(part="right foot" if higher_m > 0 else "left foot"),
-            difference_m=Quantity(abs(higher_m), "m", limit=_FLAT_M, usual=(0.0, 0.012)),
+            difference_m=Quantity(abs(higher_m), "m", limit=_FLAT_M, usual=_FLAT_M.usual),
             landmark=Quantity(landmark),
         )

@@ -6,15 +6,18 @@ import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.foot_trajectories import LEAST_BELT_M_S, standing_speeds
+from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, finding
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.plate_assignment import FOOT_NAMES
 
-_APART = 0.25
+_APART = Limit(0.25)
 """Share by which a stated speed may differ from the one of standing feet, which roll."""
 _KM_H = 3.6
 
 
+@check("T301", apart=_APART, slow=Limit(LEAST_BELT_M_S, "m/s"))
 def belt_speed(context: RecordingContext) -> Iterator[Finding]:
     """Report T301: a stated belt speed that differs from the speed of feet in stance; of two feet, the larger error."""
     belt, time = context.recording.belt, context.all_markers.time

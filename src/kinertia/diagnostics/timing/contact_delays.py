@@ -23,19 +23,20 @@ from kinertia.diagnostics.evidence.plate_contacts import (
     loads_on,
 )
 from kinertia.findings.finding import finding, with_evidence
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import FloatArray, PlateLoads
 
-USUAL_S = (-0.025, 0.025)
-_DELAY_S, _LONGEST_DELAY_S = 0.045, 0.25
+DELAY_S, LONGEST_DELAY_S = Limit(0.045, "s", usual=(-0.025, 0.025)), Limit(0.25, "s")
 """Clocks and filters delay by less than the latter; what is later began at another time."""
-_RATE = (0.7, 1.4)
-_FEWEST_CONTACTS, _LEAST_RATE_ERROR, _CERTAIN, _EXCLUDED, _MOST_RATE_ERROR = 4, 0.004, 6.0, 3.0, 0.1
+RATES = (Limit(0.7, usual=(0.96, 1.22)), Limit(1.4, usual=(0.96, 1.22)))
+LEAST_RATE_ERROR = Limit(0.004, usual=(-0.001, 0.001))
+_FEWEST_CONTACTS, _CERTAIN, _EXCLUDED, _MOST_RATE_ERROR = 4, 6.0, 3.0, 0.1
 """Over 14 and 28 contacts of fault-free runs a delay grows by less than 0.001; with a rate that is wrong by 1 % by
 0.01. A larger error than the last shows in the duration of loads."""
 _DELAY_SD_S, _LEAP_S = 0.010, 0.06
 """A frame or so; and how much a delay cannot change from one contact to the next."""
-_WRONG_S, _CLEARLY_BEST = 0.045, 0.5
+_CLEARLY_BEST = 0.5
 _LEAST_RATE, _MOST_RATE, _RATE_STEP = 1.08, 2.5, 0.01
 """Range and step of rate factors; smaller errors show in the growing delay of many contacts (`contact_delays`)."""
 _LONGEST_TRIED_S, _DELAY_STEP_S = 0.25, 0.01
@@ -60,12 +61,12 @@ def stance_durations(context: RecordingContext) -> Iterator[Hypothesis]:
     by_plates, by_markers = float(np.median(loaded)), float(np.median(standing))
     ratio, frame_s = by_plates / by_markers, float(np.median(np.diff(feet[0].time)))
     # of 0.2 s at 25 frames a second a foot seems to stand for 0.16 to 0.24 s
-    if (by_markers - frame_s) / by_plates < _RATE[1] and (by_markers + frame_s) / by_plates > _RATE[0]:
+    if (by_markers - frame_s) / by_plates < RATES[1] and (by_markers + frame_s) / by_plates > RATES[0]:
         return
     found = finding(
         "T201",
         context.at(),
-        ratio=Quantity(ratio, "1", usual=(0.96, 1.22)),
+        ratio=Quantity(ratio, "1", usual=RATES[0].usual),
         stance_s=Quantity((by_markers, by_plates), "s"),
         contacts=Quantity(len(loaded), "1"),
         method=Quantity("duration of stance by markers and by plates"),
@@ -111,17 +112,17 @@ def contact_delays(context: RecordingContext) -> Iterator[Hypothesis]:
         return
     # both ends must agree: a plate that was left early, or a foot that drags, moves one end
     delay = delays.delay_s
-    if abs(delay) <= _DELAY_S or min(delays.median_s * np.sign(delay)) < _DELAY_S / 2:
+    if abs(delay) <= DELAY_S or min(delays.median_s * np.sign(delay)) < DELAY_S / 2:
         return
     corrected = replace(plates, time=plates.time - delay)
     far_m = max((one.distance_m for one in contacts_of(corrected, feet)), default=np.inf)
     measured = {
-        "delay_s": Quantity(delay, "s", limit=_DELAY_S, usual=USUAL_S),
+        "delay_s": Quantity(delay, "s", limit=DELAY_S, usual=DELAY_S.usual),
         "begin_s": Quantity(float(delays.median_s[0]), "s"),
         "end_s": Quantity(float(delays.median_s[1]), "s"),
         "contacts": Quantity(len(delays.time), "1"),
     }
-    if far_m > FAR_M / 2 or abs(delay) > _LONGEST_DELAY_S:
+    if far_m > FAR_M / 2 or abs(delay) > LONGEST_DELAY_S:
         distance = Quantity(far_m, "m", limit=FAR_M / 2)
         yield Hypothesis(with_evidence("T212", context.at(), measured | {"distance_m": distance}), corrected)
         return
@@ -197,7 +198,7 @@ class ContactDelays:
         """Return whether the delay changes significantly over time."""
         return (
             len(self.time) >= _FEWEST_CONTACTS
-            and abs(self.rate_error) > _LEAST_RATE_ERROR
+            and abs(self.rate_error) > LEAST_RATE_ERROR
             and abs(self.rate_error) > _CERTAIN * self.rate_error_sd
         )
 
@@ -244,7 +245,7 @@ def fitted_rate_or_delay(context: RecordingContext) -> Iterator[Hypothesis]:
     if plates is None or context.plates is None or feet is None or not contacts:
         return
     read = ContactFit.of(contacts, feet)
-    in_time = read.delay_rms_s <= _WRONG_S or len(contacts) < len(context.contacts)
+    in_time = read.delay_rms_s <= DELAY_S or len(contacts) < len(context.contacts)
     if in_time and read.far_m < FITS_M:
         return
     start = max(float(plates.time[0]), float(feet[0].time[0]))
@@ -265,11 +266,11 @@ def fitted_rate_or_delay(context: RecordingContext) -> Iterator[Hypothesis]:
     if read.far_m < FAR_M:
         return
     delay = _best_delay(plates, feet)
-    if delay.fit.fits and abs(delay.value) > _WRONG_S:
+    if delay.fit.fits and abs(delay.value) > DELAY_S:
         found = finding(
             "T211",
             context.at(),
-            delay_s=Quantity(delay.value, "s", limit=_WRONG_S, usual=USUAL_S),
+            delay_s=Quantity(delay.value, "s", limit=DELAY_S, usual=DELAY_S.usual),
             before_m=Quantity(read.far_m, "m"),
             after_m=Quantity(delay.fit.far_m, "m"),
             contacts=Quantity(len(contacts), "1"),

@@ -3,7 +3,9 @@
 from collections.abc import Iterator
 
 from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, finding
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import FEET, Trial
 from kinertia.trial.file_contents import GaitEvent
@@ -18,6 +20,7 @@ from kinertia.trial.gait_events import (
 from kinertia.trial.plate_assignment import FOOT_NAMES
 
 
+@check("T311", "T312", "T313", "T314", apart=Limit(EVENT_LIMIT_S, "s"))
 def file_events(context: RecordingContext) -> Iterator[Finding]:
     """Report T311 to T314: the event of a file farthest from its forces (T311), events with sides exchanged, all of
     them (T312) or a few (T313), or times that count from the first frame (T314).

@@ -22,11 +22,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.horizontal_velocity import ForceVelocity, joined_without_trend
 from kinertia.diagnostics.evidence.vertical_acceleration import LARGEST_RESIDUAL, vertical_match_of
 from kinertia.diagnostics.person_context import PersonContext
+from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N
@@ -35,12 +38,11 @@ from kinertia.trial.sampled_time import span_s
 
 _LEAST_WINDOW_S = 0.8
 """Parts of half a second of one trial differ by up to 40 ms."""
-_SHORT_S = 1.0
-_APART_S, _SHORT_APART_S = 0.012, 0.018
+_SHORT_S = Limit(1.0, "s")
+_APART_S, _SHORT_APART_S = Limit(0.012, "s", usual=(-0.004, 0.004)), Limit(0.018, "s")
 """Smallest notable difference of delays, in longer windows and in shorter ones."""
-_USUAL_S = (-0.004, 0.004)
 _LEAST_PLATE_WINDOW_S = 0.6
-_DIFFERENCE_S, _USUAL_DIFFERENCE_S = 0.012, 0.005
+_DIFFERENCE_S = Limit(0.012, "s", usual=(-0.005, 0.005))
 _EXPLAINS, _CLEARLY_BEST = 0.65, 0.85
 """Shares of the residual with one delay for all plates, and of that with a gain error of each plate, that may be left.
 On fault-free recordings 0.70 of the former and more are."""
@@ -48,10 +50,10 @@ _BOTH_ENDS, _UNEQUAL_S = 0.4, 0.02
 """While its force grows and while it falls, a late plate lags by at least this share of the difference; the two delays
 of the other plate differ by no more than this. On nine walks this holds for every late plate that meets the other
 limits, and for no plate with a simulated foot 10 to 30 mm over its edge."""
-_LEAST_RATE_WINDOW_S, _LEAST_GROWTH = 1.0, 0.0105
+_LEAST_RATE_WINDOW_S, _LEAST_GROWTH = 1.0, Limit(0.0105, usual=(-0.004, 0.004))
 """By pelvis or by marker-based centre the delay of 21 fault-free trials grows by -0.017 to 0.013 in windows of 1.03 to
 1.3 s and by up to 0.002 in longer ones, and by both in one direction by at most 0.004."""
-_LEAST_RATIO, _MOST_RATIO, _USUAL_RATIO, _TYPICAL_RATIO = 0.4, 1.8, (0.67, 0.99), 0.9
+_LEAST_RATIO, _MOST_RATIO, _TYPICAL_RATIO = Limit(0.4, usual=(0.67, 0.99)), Limit(1.8), 0.9
 """On 26 fault-free trials, from squats to runs; at half the true rate it is four times as much."""
 
 
@@ -84,6 +86,7 @@ def trial_delay(context: RecordingContext) -> TrialDelay | None:
     return TrialDelay(context.name, float(pelvis), float(markers), max(spans) < _SHORT_S)
 
 
+@check("T213", delay=_APART_S, short=_SHORT_APART_S, window=_SHORT_S)
 def trial_delays(person: PersonContext) -> Iterator[Finding]:
     """Report T213: trials whose delay differs from the other trials'."""
     if len(person.trials) > 1:
@@ -106,13 +109,14 @@ def uneven_delays(delays: Sequence[TrialDelay | None]) -> Iterator[Finding]:
         yield finding(
             "T213",
             Where(trial=one.name),
-            delay_s=Quantity(float(delays_s.mean()), "s", limit=limit_s, usual=_USUAL_S),
+            delay_s=Quantity(float(delays_s.mean()), "s", limit=limit_s, usual=_APART_S.usual),
             by_pelvis_s=Quantity(one.by_pelvis_s, "s"),
             by_markers_s=Quantity(one.by_markers_s, "s"),
             others_s=Quantity(tuple(float(each) for each in others), "s"),
         )
 
 
+@check("T216", unless=needs.VELOCITY, difference=_DIFFERENCE_S)
 def plate_delay(context: RecordingContext) -> Iterator[Finding]:
     """Report T216: each plate with a delay of its own explains the vertical velocity, and neither one for all nor gains
     do."""
@@ -147,9 +151,7 @@ def plate_delay(context: RecordingContext) -> Iterator[Finding]:
         context.at(),
         {
             "plate": Quantity(named),
-            "difference_s": Quantity(
-                difference_s, "s", limit=_DIFFERENCE_S, usual=(-_USUAL_DIFFERENCE_S, _USUAL_DIFFERENCE_S)
-            ),
+            "difference_s": Quantity(difference_s, "s", limit=_DIFFERENCE_S, usual=_DIFFERENCE_S.usual),
             "other": Quantity(other),
             "velocity_residual_m_s": Quantity((together, own), "m/s", limit=_EXPLAINS * together),
         },
@@ -185,6 +187,7 @@ def _fitted(terms: FloatArray, wanted: FloatArray) -> tuple[FloatArray, float]:
     return factors, float(np.std(wanted - terms @ factors))
 
 
+@check("T201", "T202", unless=needs.VELOCITY, vertical_growth=_LEAST_GROWTH, least=_LEAST_RATIO, most=_MOST_RATIO)
 def force_rate(context: RecordingContext) -> Iterator[Finding]:
     """Report T202 and T201: a wrong rate by the velocity ratio (T202); delays that grow or shrink in a measured window
     (T201).
@@ -212,7 +215,9 @@ def _wrong_rate(context: RecordingContext) -> Iterator[Finding]:
             context.at(),
             # at less than the true rate forces seem to move the body faster
             rate_factor=Quantity(float(np.sqrt(_TYPICAL_RATIO / ratio)), "1"),
-            velocity_ratio=Quantity(ratio, "1", limit=_MOST_RATIO if ratio > 1 else _LEAST_RATIO, usual=_USUAL_RATIO),
+            velocity_ratio=Quantity(
+                ratio, "1", limit=_MOST_RATIO if ratio > 1 else _LEAST_RATIO, usual=_LEAST_RATIO.usual
+            ),
         )
 
 
@@ -246,6 +251,6 @@ def _growing_delays(context: RecordingContext) -> Iterator[Finding]:
             Severity.WARNING,
             ratio=Quantity(1.0 / (1.0 - mean), "1"),
             delay_s=Quantity((float(begin), float(end)), "s"),
-            rate_error=Quantity(mean, "1", limit=_LEAST_GROWTH, usual=(-0.004, 0.004)),
+            rate_error=Quantity(mean, "1", limit=_LEAST_GROWTH, usual=_LEAST_GROWTH.usual),
             method=Quantity("vertical velocity"),
         )

@@ -22,6 +22,7 @@ from kinertia.diagnostics.evidence.horizontal_velocity import (
     without_trend,
 )
 from kinertia.diagnostics.person_context import PersonContext
+from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
@@ -32,6 +33,7 @@ _BETTER, _EACH_BETTER = 0.8, 0.92
 early, either may seem to go with the other's forces, but not both."""
 
 
+@check("S304")
 def interchanged_forces(person: PersonContext) -> Iterator[Finding]:
     """Report S304: two trials whose forces seem to be interchanged, one finding for each."""
     loaded = [one for one in person.trials if one.trial is not None]

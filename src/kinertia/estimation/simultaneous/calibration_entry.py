@@ -27,7 +27,7 @@ SHOWN_UNIT = {
 """Factor and unit in which a calibrated quantity is shown."""
 INTERVAL_SD = 1.96
 """Half of a 95 % interval, in standard deviations."""
-_NOTABLE = 2.0
+NOTABLE = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,17 +81,17 @@ class CalibrationEntry:
     @property
     def notable(self) -> bool:
         """Whether the error exceeds two prior standard deviations."""
-        return abs(self.value) > _NOTABLE * self.prior_sd
+        return abs(self.value) > NOTABLE * self.prior_sd
 
     @property
     def found(self) -> bool:
         """Whether the error also exceeds two posterior standard deviations."""
-        return self.notable and abs(self.value) > _NOTABLE * self.sd
+        return self.notable and abs(self.value) > NOTABLE * self.sd
 
     @property
     def moves_moments(self) -> bool:
         """Whether the error exceeds two posterior standard deviations and affects joint moments beyond their bars."""
-        return abs(self.value) > _NOTABLE * self.sd and self.moved is not None and self.moved > 1.0
+        return abs(self.value) > NOTABLE * self.sd and self.moved is not None and self.moved > 1.0
 
     @property
     def supported(self) -> bool:

@@ -1,0 +1,80 @@
+"""Fills limits into what the catalogue says of a code: what it detects, and when it is more or less severe.
+
+A text refers to a limit of the check that reports the code by its name there: `{off_plate:%}` is "5 %", `{lever_arm}`
+is "150 mm", `{lever_arm.usual}` is the range of recordings
+without faults, `{lever_arm.least}` and `{lever_arm.most}` are its ends.
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+from kinertia.diagnostics.labels.swapped_markers import LOST_M
+from kinertia.diagnostics.model.model_on_person import MOVED_M
+from kinertia.diagnostics.model.range_limits import AT_LIMIT, BEYOND_RAD, CLAMPED
+from kinertia.diagnostics.registry import MOTION_CHECKS, PERSON_CHECKS, STATIC_CHECKS
+from kinertia.diagnostics.result.registry import ESTIMATE_CHECKS, RESULT_CHECKS
+from kinertia.diagnostics.result.session import APART_SD
+from kinertia.diagnostics.runner import Check
+from kinertia.findings.display import exact
+from kinertia.findings.limit import Limit
+from kinertia.findings.rule import Rule
+from kinertia.io.opensim.reader import EARTHS_GRAVITY_M_S2
+
+ALL_CHECKS: tuple[Check[Any], ...] = (*STATIC_CHECKS, *MOTION_CHECKS, *PERSON_CHECKS, *ESTIMATE_CHECKS, *RESULT_CHECKS)
+REPORTED_ELSEWHERE: Mapping[str, Mapping[str, Limit]] = {
+    "O104": {"least": Limit(EARTHS_GRAVITY_M_S2[0], "m/s2"), "most": Limit(EARTHS_GRAVITY_M_S2[1], "m/s2")},
+    "O311": {"clamped": CLAMPED},
+    "O312": {"share": AT_LIMIT, "beyond": BEYOND_RAD},
+    "O407": {"moved": MOVED_M},
+    "R106": {"lost": LOST_M},
+    "S501": {"apart": APART_SD},
+}
+"""Limits of codes that no check of these lists reports, but a stage between them."""
+_NAME = re.compile(r"\{(\w+)(?:\.(usual|least|most))?(?::([%]))?\}")
+
+
+def with_limits(one: Rule) -> Rule:
+    """Return a rule whose texts have its limits in place of their names.
+
+    >>> from kinertia.findings.rule import rule
+    >>> with_limits(rule("P245")).detects
+    'Centres of pressure outside the corners of the plate for more than 5 % of the load.'
+    """
+    limits = limits_of(one.code)
+    return replace(one, detects=_rendered(one.detects, limits), escalation=_rendered(one.escalation, limits))
+
+
+@cache
+def limits_of(code: str) -> Mapping[str, Limit]:
+    """Return the limits that decide on a code, by name.
+
+    Raises:
+        ValueError: two checks have different limits of that name.
+    """
+    result: dict[str, Limit] = {}
+    declared = [one.limits for one in ALL_CHECKS if code in one.codes]
+    for limits in (*declared, REPORTED_ELSEWHERE.get(code, {})):
+        for name, limit in limits.items():
+            if result.setdefault(name, limit) != limit:
+                raise ValueError(f"{code} has two limits {name}: {result[name]:g} and {limit:g}")
+    return result
+
+
+def _rendered(text: str, limits: Mapping[str, Limit]) -> str:
+    def one(match: re.Match[str]) -> str:
+        name, part, style = match.groups()
+        if name not in limits:
+            return match.group(0)
+        limit = limits[name]
+        if part is None:
+            return exact(limit, limit.unit, style or "")
+        if limit.usual is None:
+            raise ValueError(f"what is usual of {name} is not known")
+        least, most = limit.usual
+        ends: dict[str, float | tuple[float, float]] = {"usual": (least, most), "least": least, "most": most}
+        return exact(ends[part], limit.unit, style or "")
+
+    return _NAME.sub(one, text)
