@@ -23,8 +23,8 @@ def test_final_print_is_verdict_three_findings_and_where_the_results_are(fit_of)
     severities = [
         one["severity"] for one in fit.summary["findings"] if (one["status"], one["muted_by"]) == ("open", None)
     ]
-    assert first.startswith(f"{fit.summary['verdict']}: ")
-    assert "; 1 of 1 trials" in first
+    assert first.startswith(f"{fit.summary['verdict'].capitalize()}. ")
+    assert first.endswith("the trial was used.")
     assert len([line for line in found if line.startswith(("ERROR", "WARNING", "CORRECTED"))]) <= 3
     assert all(not line.startswith("INFO") for line in found)
     assert f"{severities.count('INFO')} assumption" in " ".join(found)
@@ -98,7 +98,7 @@ def fit_at_once(monkeypatch, short_fit, person):
 def test_an_error_of_the_result_is_status_1_and_the_results_are_there(fit_at_once, tmp_path):
     outcome = fit_at_once("-o", tmp_path / "out")
     assert outcome.status == 1
-    assert outcome.out.startswith("do not use: 1 error; ")
+    assert outcome.out.startswith("Do not use. One error")
     assert "\nERROR  R201 " in outcome.out
     told = json.loads((tmp_path / "out" / "fit.json").read_text())
     assert (told["converged"], told["verdict"]) == (False, "do not use")
@@ -114,7 +114,7 @@ def test_warnings_are_status_0(fit_at_once, tmp_path):
     fit_at_once.findings = (*fit_at_once.findings[:-1], NOT_CONVERGED.at(Severity.WARNING))
     outcome = fit_at_once("-o", tmp_path / "out")
     assert outcome.status == 0
-    assert outcome.out.startswith("use with care: ")
+    assert outcome.out.startswith("Use with care. ")
 
 
 def test_quiet_fit_says_nothing(fit_at_once, tmp_path):

@@ -34,15 +34,18 @@ def test_an_open_error_or_a_trial_left_out_fails():
 
 def test_the_line_counts():
     overview = Overview((*FROZEN, DELAY), 61, 3, ("walk 2",))
-    assert overview.line == "use with care: 3 warnings, 1 corrected; 2 of 3 trials"
+    assert overview.line == "Use with care. Three warnings; one error was corrected; 2 of 3 trials were used."
 
 
 def test_the_line_counts_what_is_overruled():
     """Of a recording with an ignored warning it was said that nothing was found."""
     ignored = (*(replace(one, status="ignored") for one in FROZEN), replace(DELAY.muted("P243"), status="ignored"))
-    assert Overview(ignored, 61, 1).line == "use: 3 ignored; 1 of 1 trials"
+    assert Overview(ignored, 61, 1).line == "Use. Three findings were ignored; the trial was used."
     waived = replace(SPIKES, status="waived")
-    assert Overview((*ignored, waived), 61, 1).line == "use with care: 1 waived, 3 ignored; 1 of 1 trials"
+    assert (
+        Overview((*ignored, waived), 61, 1).line
+        == "Use with care. One error was waived; three findings were ignored; the trial was used."
+    )
 
 
 def test_the_worst_comes_first():
@@ -88,7 +91,7 @@ def test_equal_findings_of_one_marker_are_counted():
 
 
 def test_a_model_alone_has_no_trials():
-    assert Overview((), 31, 0).line == "use: nothing found"
+    assert Overview((), 31, 0).line == "Use. No problems were found."
 
 
 def test_equal_findings_of_one_plate_differ_by_their_axes():

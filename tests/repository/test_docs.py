@@ -79,7 +79,7 @@ def test_examples_run(group, folder, workshop, request):
             program, *arguments = shlex.split(command)
             assert program == "kinertia"
             outcome = run(*arguments)
-            expected = 1 if "\ndo not use: " in f"\n{shown}" else 0
+            expected = 1 if "\nDo not use. " in f"\n{shown}" else 0
             assert outcome.status == expected, f"{command}\n{outcome.out}\n{outcome.err}"
             missing = difference(shown, outcome.out)
             assert missing is None, f"{command}\nshown on the page:\n{missing}\nreally:\n{outcome.out}"

@@ -70,7 +70,7 @@ def test_its_markers_alone_count(fit):
     assert not [one for one in fit.posterior.calibration if one.trial == "squat"]
     assert not fit.left_out
     assert fit.converged
-    assert fit.overview.line.endswith("1 of 1 trials, and the markers of 1 more")
+    assert fit.overview.line.endswith("the trial was used, and the markers of one more.")
 
 
 def test_draws_are_of_the_trials_in_the_result(fit, tmp_path):
@@ -128,14 +128,14 @@ def test_a_trial_whose_forces_are_refused_gives_its_markers(lab):
     assert [one.trial.name for one in ready.kinematics] == ["walk"]
     assert [one.trial.name for one in ready.functional] == ["empty"]
     assert ready.left_out == ("empty",)
-    assert check_person(screened.person).overview.line.endswith("1 of 2 trials, and the markers of 1 more")
+    assert check_person(screened.person).overview.line.endswith("1 of 2 trials was used, and the markers of one more.")
 
 
 def test_check_counts_it_as_a_fit_does(lab):
     measured, squats = lab
     inputs = [TrialInput(measured.walk), TrialInput(squats, use="kinematics")]
     line = check_person(Person(SUBJECT, inputs, measured.static)).overview.line
-    assert line.endswith("1 of 1 trials, and the markers of 1 more")
+    assert line.endswith("the trial was used, and the markers of one more.")
 
 
 def test_its_markers_must_be_sound(lab):
@@ -156,7 +156,7 @@ def test_a_window_with_hardly_any_of_its_frames_leaves_it_out(lab, window_s):
     checked = check_person(Person(SUBJECT, inputs, measured.static))
     (found,) = [one for one in checked.findings if one.where.trial == "squat" and one.severity.name == "ERROR"]
     assert (found.code, found.evidence["key"].value) == ("F191", "window_s")
-    assert checked.overview.line.endswith("1 of 2 trials")
+    assert checked.overview.line.endswith("1 of 2 trials was used.")
     ready = prepare(SUBJECT, measured.static, inputs)
     assert (ready.functional, ready.left_out) == ((), ("squat",))
 

@@ -19,6 +19,7 @@ WITH_CARE: Final = "use with care"
 DO_NOT_USE: Final = "do not use"
 USES: Final = (USE, WITH_CARE, DO_NOT_USE)
 """The best first."""
+_NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class Overview:
     Examples:
         >>> from kinertia.findings.overview import Overview
         >>> Overview((), 61, 2).line
-        'use: nothing found; 2 of 2 trials'
+        'Use. No problems were found; both trials were used.'
     """
 
     findings: Sequence[Finding]
@@ -89,19 +90,31 @@ class Overview:
 
     @property
     def line(self) -> str:
-        """Verdict with its basis, in one line."""
-        counts = [
-            (self.count(Severity.ERROR), "error", "errors"),
-            (self.count(Severity.WARNING), "warning", "warnings"),
-            (self.count(Severity.CORRECTED), "corrected", "corrected"),
-            (len(self.waived), "waived", "waived"),
-            (sum(one.status == "ignored" and one.muted_by is None for one in self.findings), "ignored", "ignored"),
+        """Verdict with its basis, in plain sentences."""
+        open_ones = (_counted(self.count(Severity.ERROR), "error"), _counted(self.count(Severity.WARNING), "warning"))
+        ignored = sum(one.status == "ignored" and one.muted_by is None for one in self.findings)
+        parts = [
+            " and ".join(filter(None, open_ones)),
+            _counted(self.count(Severity.CORRECTED), "error", "corrected"),
+            _counted(len(self.waived), "error", "waived"),
+            _counted(ignored, "finding", "ignored"),
         ]
-        found = ", ".join(f"{count} {one if count == 1 else many}" for count, one, many in counts if count)
+        found = [*filter(None, parts)] or ["no problems were found"]
+        sentence = "; ".join([*found, *filter(None, [self._trials_used])])
+        return f"{self.verdict.capitalize()}. {sentence[0].upper()}{sentence[1:]}."
+
+    @property
+    def _trials_used(self) -> str:
+        """Part of the line that says which trials were used; empty where there are none."""
         used, by_markers = self.trials - len(self.left_out), len(self.markers_only)
-        more = f", and the markers of {by_markers} more" if by_markers else ""
-        trials = f"; {used} of {self.trials} trials" if self.trials else ""
-        return f"{self.verdict}: {found or 'nothing found'}{trials}{more}"
+        if not self.trials:
+            return ""
+        if used < self.trials:
+            text = f"{used} of {self.trials} trials {'was' if used == 1 else 'were'} used"
+        else:
+            whole = {1: "the trial was", 2: "both trials were"}
+            text = f"{whole.get(used, f'all {_number(used)} trials were')} used"
+        return text + (f", and the markers of {_number(by_markers)} more" if by_markers else "")
 
     @property
     def markers_only(self) -> set[str | None]:
@@ -109,6 +122,18 @@ class Overview:
         (P283)."""
         asked, refused = ({one.where.trial for one in self.findings if one.code == code} for code in ("P280", "P283"))
         return asked - set(self.left_out) | refused
+
+
+def _number(count: int) -> str:
+    """Return a small number in words; larger ones as digits."""
+    return _NUMBERS[count] if count < len(_NUMBERS) else str(count)
+
+
+def _counted(count: int, noun: str, done: str = "") -> str:
+    """Return a count in words, "two errors were corrected"; empty for none."""
+    nouns = f"{_number(count)} {noun}{'' if count == 1 else 's'}"
+    clause = f" {'was' if count == 1 else 'were'} {done}" if done else ""
+    return nouns + clause if count else ""
 
 
 def in_order(findings: Iterable[Finding]) -> list[Finding]:

@@ -19,7 +19,7 @@ def test_model(measured_folder, tmp_path, monkeypatch):
     assert outcome.status == 0
     assert re.search(r"pelvis +model +13\.30", outcome.out)
     assert re.search(r"de Leva +9\.49", outcome.out)
-    assert max(map(len, outcome.out.partition("\nuse with care: ")[0].splitlines())) <= 80
+    assert max(map(len, outcome.out.partition("\nUse with care. ")[0].splitlines())) <= 80
     page = text_of_page(tmp_path / "out" / "check.html")
     assert "Segments, in ISB axes" in page
     assert "13.30" in page

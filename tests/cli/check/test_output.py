@@ -22,7 +22,7 @@ def text(outcome):
 def test_the_verdict_is_one_line_and_verbose_says_all(lab):
     outcome = run("check", lab / "subject.toml")
     assert outcome.status == 0
-    assert re.match(r"use: nothing found; 1 of 1 trials\n", outcome.out)
+    assert re.match(r"Use\. No problems were found; the trial was used\.\n", outcome.out)
     assert outcome.err.splitlines() == ["reading"]
     loud = run("check", lab / "subject.toml", "-v")
     findings = told(lab / "subject.toml")["findings"]
@@ -30,7 +30,7 @@ def test_the_verdict_is_one_line_and_verbose_says_all(lab):
     for one in findings:
         assert f"{one['severity']}  " in loud.out
         assert f"{one['code']} {one['message']}" in loud.out
-    before = loud.out.partition("\nuse: ")[0].splitlines()
+    before = loud.out.partition("\nUse. ")[0].splitlines()
     assert max(map(len, before)) <= 80
     for facts in facts_of(told(lab / "subject.toml")).values():
         for name, sentence in facts.items():

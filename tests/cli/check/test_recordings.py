@@ -61,7 +61,7 @@ def test_another_mass_is_status_1(lab):
     assert found["evidence"]["stated_kg"]["value"] == 90.0
     assert found["evidence"]["mass_by_force_kg"]["value"] == pytest.approx(72.6, abs=0.5)
     outcome = run("check", *files)
-    assert re.match(r"do not use: 1 error; 0 of 1 trials\nERROR  walk  S111 ", outcome.out)
+    assert re.match(r"Do not use\. One error; 0 of 1 trials were used\.\nERROR  walk  S111 ", outcome.out)
 
 
 def test_labels_of_another_marker_set_are_one_error(lab):
@@ -114,7 +114,7 @@ def test_a_broken_file_does_not_hide_the_others(lab):
     assert list(facts_of(content)) == ["static", "walk"]
     outcome = run("check", *files, "-o", lab / "out")
     assert outcome.status == 1
-    assert "1 of 2 trials\nERROR  broken  F103 " in outcome.out
+    assert "1 of 2 trials was used.\nERROR  broken  F103 " in outcome.out
     page = text_of_page(lab / "out" / "check.html")
     for phrase in ("F103", "The content of broken.c3d", "static", "walk"):
         assert phrase in page
@@ -133,5 +133,5 @@ def test_every_measured_file_gets_an_answer(measured_folder):
         if outcome.status == 2:
             assert outcome.err.splitlines()[-1].startswith(f"error: {path}")
         else:
-            assert outcome.out.startswith("do not use: ") == (outcome.status == 1)
+            assert outcome.out.startswith("Do not use. ") == (outcome.status == 1)
     assert seen == {0, 1, 2}

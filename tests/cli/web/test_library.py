@@ -120,7 +120,7 @@ def test_what_was_not_finished_is_said_to_be_interrupted_and_what_was_stays(libr
     with library.opened():
         told = {person.name: standing(person, Jobs()) for person in library.people()}
     assert "Interrupted" in told["Anna"].sentence
-    assert told["Ben"].sentence == "use: nothing found; 1 of 1 trials"
+    assert told["Ben"].sentence == "Use. No problems were found; the trial was used."
     assert told["Ben"].fitted
     assert told["Ben"].look == "info"
     (ben.results / "fit.json").write_text('{"kinertia": "of the command line"}')
