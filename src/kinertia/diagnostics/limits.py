@@ -47,6 +47,11 @@ def with_limits(one: Rule) -> Rule:
     return replace(one, detects=_rendered(one.detects, limits), escalation=_rendered(one.escalation, limits))
 
 
+def names_in(one: Rule) -> set[str]:
+    """Return the names of limits in the texts of a rule."""
+    return {match.group(1) for text in (one.detects, one.escalation) for match in _NAME.finditer(text)}
+
+
 @cache
 def limits_of(code: str) -> Mapping[str, Limit]:
     """Return the limits that decide on a code, by name.
