@@ -120,7 +120,7 @@ smaller than after two. Other motions tell more.
 
 What breaks the bars breaks those of joint moments first: hip centres 15 mm off and calibration switched off leave 48
 % for hip flexion and 69 % for knees, axes 5 degrees off 82 % for ankles, a gain of 2 % that is not calibrated 89 %
-for ankles. Bars of masses, CoMs and inertias hold whatever is done: most are wide. Wobbling thighs do little in the
+for ankles. Bars of masses, CoMs and inertias always cover the truth: most are wide. Wobbling thighs do little in the
 smooth synthetic walk, which has no impacts.
 """
 

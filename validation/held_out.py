@@ -67,7 +67,7 @@ def document(people: dict[str, list[dict[str, Any]]]) -> str:
     headings = ["person", "held out", "objective", "force (N)", "moment (N m)", "markers (mm)"]
     return f"""# Held-out trials
 
-Residuals prove nothing on the trial that they were made small on. `kinertia crossval` holds every trial out in turn:
+Small residuals on the fitted trial prove nothing. `kinertia crossval` holds every trial out in turn:
 BSPs are estimated from the others and frozen; on the trial held out, motion and calibration are estimated again, once
 with these BSPs and once with the literature's (or the model's own). Objective: half the sum of squares, each over its
 deviation; residuals and marker distances are RMS. Left of the arrow the literature's BSPs, right of it those from the

@@ -72,7 +72,7 @@ def _parameter(parameter: Any) -> str:
 
 
 def _table(model: type[Table]) -> str:
-    rows = ["| key | what | left out |", "|---|---|---|"]
+    rows = ["| key | what | default |", "|---|---|---|"]
     for name, field in model.model_fields.items():
         if field.is_required():
             default = "" if name == "name" else "is an error"

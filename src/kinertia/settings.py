@@ -164,7 +164,7 @@ class Subject(Table):
         default="subject", min_length=1, description="name in files and report; left out: the folder's name"
     )
     sex: Annotated[Literal["male", "female"] | None, BeforeValidator(sex_of)] = Field(
-        default=None, description='"male" or "female": which table of the literature'
+        default=None, description='"male" or "female": selects the body tables'
     )
     mass_kg: float | None = Field(default=None, description="body mass on the scale, kg")
     height_m: float | None = Field(default=None, description="stature, m")

@@ -18,7 +18,7 @@ from kinertia.report.figures.measures_picture import measures_picture
 
 
 def init(
-    folder: Annotated[Path, typer.Argument(help="Folder with the files of one person, or one of them.")],
+    folder: Annotated[Path, typer.Argument(help="One person's folder, or any file in it.")],
     measures: Annotated[
         bool, typer.Option("--measures", help="Write the sheet of girths and lengths to fill in, and no subject.toml.")
     ] = False,

@@ -79,7 +79,7 @@ Waive = Annotated[
     list[str] | None,
     typer.Option("--waive", metavar="CODE", help="Go on in spite of this ERROR; shown as waived. May be repeated."),
 ]
-Output = Annotated[Path, typer.Option("--output", "-o", help="Folder for the results; Kinertia's own are replaced.")]
+Output = Annotated[Path, typer.Option("--output", "-o", help="Folder for the results; Kinertia's earlier ones are replaced.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Write even if the folder holds other files.")]
 Loads = Annotated[
     Path | None,
