@@ -54,7 +54,7 @@ def sex(text: str) -> str:
 
 
 Sex = Annotated[
-    str | None, typer.Option(parser=sex, metavar="SEX", help="male or female (m, f): which table of the literature.")
+    str | None, typer.Option(parser=sex, metavar="SEX", help="male or female (m, f): selects the body tables.")
 ]
 Mass = Annotated[
     float | None, typer.Option(parser=number, metavar="KG", help="Body mass, kg; a C3D file may contain it.")
@@ -79,7 +79,7 @@ Waive = Annotated[
     list[str] | None,
     typer.Option("--waive", metavar="CODE", help="Go on in spite of this ERROR; shown as waived. May be repeated."),
 ]
-Output = Annotated[Path, typer.Option("--output", "-o", help="Folder for the results; Kinertia's earlier ones are replaced.")]
+Output = Annotated[Path, typer.Option("--output", "-o", help="Folder for the results; earlier ones are replaced.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Write even if the folder holds other files.")]
 Loads = Annotated[
     Path | None,
