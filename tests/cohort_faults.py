@@ -7,9 +7,8 @@ from unittest import mock
 import numpy as np
 
 from kinertia.cohort.job import Job
-from kinertia.cohort.person import fit_person
 from kinertia.cohort.record import Record
-from kinertia.cohort.worker import main
+from kinertia.cohort.worker import fit_person, main
 from kinertia.synthetic.laboratory import LabNoise, record, write_lab
 from kinertia.synthetic.walk import walk, walking_subject
 
@@ -37,7 +36,7 @@ def fit_person_unless_hanging(job: Job) -> Record:
     """What a worker does, where the files of one person hang the reader."""
     if job.person != HANGING:
         return fit_person(job)
-    with mock.patch("kinertia.cohort.person.read_subject", hang):
+    with mock.patch("kinertia.cohort.worker.read_subject", hang):
         return fit_person(job)
 
 

@@ -24,8 +24,8 @@ from unittest import mock
 from cohort_faults import write_study
 from command_line import run
 from kinertia.cohort.job import LOG, Finished, Job, measured
-from kinertia.cohort.person import fit_person
-from kinertia.estimation.result import Fit
+from kinertia.cohort.worker import fit_person
+from kinertia.estimation.result.fit import Fit
 from kinertia.io.subject.tables import SubjectFile
 from kinertia.workflow.from_files import fit_subject
 
@@ -128,7 +128,7 @@ def main() -> None:
     with (
         mock.patch("time.perf_counter", float),
         mock.patch("kinertia.cli.cohort.fit_here", in_this_process),
-        mock.patch("kinertia.cohort.person.fit_subject", made_once(study)),
+        mock.patch("kinertia.cohort.worker.fit_subject", made_once(study)),
     ):
         counted = study.with_suffix(".txt")
         assert ended(forked(lambda: cohort(study, out, counted))) in (0, 1)

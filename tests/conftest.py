@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_limits
 from command_line import Outcome, fitted, run
 from kinertia.cli.compiling import compile_once
 from kinertia.cli.demo import Demo, run_demo, run_measured_demo
-from kinertia.estimation.result import Fit
+from kinertia.estimation.result.fit import Fit
 from kinertia.io import samples
 from kinertia.io.recording import read_recording
 from kinertia.io.subject.provenance import sha256

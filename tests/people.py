@@ -8,7 +8,7 @@ import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.person_context import PersonContext
-from kinertia.estimation.total_mass import TotalMass
+from kinertia.estimation.prepare.prepared import TotalMass
 from kinertia.findings.finding import Finding
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.imported_model import OsimModel

@@ -15,7 +15,7 @@ from kinertia.diagnostics.subject.same_person import static_and_trials, trials_o
 from kinertia.diagnostics.subject.standing import flat_feet
 from kinertia.diagnostics.timing import belt_speed, contact_delays
 from kinertia.diagnostics.timing.force_timing import TrialDelay, force_rate, uneven_delays
-from kinertia.estimation.total_mass import TotalMass
+from kinertia.estimation.prepare.prepared import TotalMass
 from kinertia.findings.where import Where
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import Markers, Recording

@@ -16,7 +16,7 @@ from kinertia.diagnostics.plates.signals import dead_moments, mains_interference
 from kinertia.diagnostics.plates.zeros import zeros
 from kinertia.findings.where import Where
 from kinertia.trial.data import PlateLoads
-from kinertia.trial.unloaded_level import UnloadedReading
+from kinertia.trial.plate_signals import UnloadedReading
 from plate_findings import plates_alone
 
 FEW = np.arange(200)

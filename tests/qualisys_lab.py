@@ -17,7 +17,7 @@ from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.synthetic.laboratory import LabNoise, record
 from kinertia.synthetic.walk import SyntheticSubject, unlike_literature, walk
 from kinertia.trial.data import LOAD_THRESHOLD_N, Markers, Recording
-from kinertia.trial.sampled_time import runs
+from kinertia.trial.sampled_data import runs
 from synthetic_lab import symmetric_person
 
 RATE_HZ, SAMPLES_PER_FRAME = 100.0, 10

@@ -14,6 +14,7 @@ from kinertia.diagnostics.result.corrections import delays, zero_offsets
 from kinertia.diagnostics.result.marker_errors import moved_markers
 from kinertia.diagnostics.result.residuals import residuals_of
 from kinertia.diagnostics.result.session import session_contradictions
+from kinertia.estimation.prepare.prepared import TotalMass
 from kinertia.estimation.simultaneous.calibration_entry import DELAY, FREE_MOMENT, GAIN, POSITION, ROTATION, ZERO
 from kinertia.estimation.simultaneous.instruments.priors import (
     DELAY_PRIOR_S,
@@ -24,7 +25,6 @@ from kinertia.estimation.simultaneous.instruments.priors import (
     ZERO_PRIOR_N,
     InstrumentPrior,
 )
-from kinertia.estimation.total_mass import TotalMass
 from kinertia.findings.where import Where
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
 from kinertia.model.marker_set import MarkerSet

@@ -7,10 +7,13 @@ import numpy as np
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.registry import ESTIMATE_CHECKS
 from kinertia.diagnostics.runner import asked, explained
+from kinertia.estimation.prepare.prepared import TotalMass
 from kinertia.estimation.simultaneous.calibration_entry import DELAY, CalibrationEntry
-from kinertia.estimation.simultaneous.instruments.model_uncertainty import GAIT27_UNCERTAINTY
-from kinertia.estimation.simultaneous.instruments.priors import InstrumentInformation, InstrumentPrior
-from kinertia.estimation.total_mass import TotalMass
+from kinertia.estimation.simultaneous.instruments.priors import (
+    GAIT27_UNCERTAINTY,
+    InstrumentInformation,
+    InstrumentPrior,
+)
 from kinertia.findings.finding import Severity
 from kinertia.settings import Settings
 from kinertia.synthetic.walk import walking_subject

@@ -7,8 +7,8 @@ from threadpoolctl import threadpool_limits
 
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.fit import fit_simultaneous
-from kinertia.estimation.simultaneous.instruments.model_uncertainty import GAIT27_UNCERTAINTY
-from kinertia.synthetic.noise import camera_noise
+from kinertia.estimation.simultaneous.instruments.priors import GAIT27_UNCERTAINTY
+from kinertia.synthetic.laboratory import camera_noise
 from kinertia.synthetic.walk import SyntheticTrial, walking_subject
 from validation.synthetic_walks import kinematics_of
 

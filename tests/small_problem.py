@@ -17,11 +17,11 @@ from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
 from kinertia.estimation.simultaneous.markers.marker_errors import ErrorProcess
 from kinertia.estimation.simultaneous.markers.skin import SkinPatterns
 from kinertia.estimation.simultaneous.mixture_prior import FaultMixture
-from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
+from kinertia.estimation.simultaneous.observation import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.search.problem import MapProblem
 from kinertia.estimation.simultaneous.terms.instrument_term import GAINS, ZEROS
 from kinertia.estimation.simultaneous.terms.instrument_term import PLATES as PLATE_ERRORS
-from kinertia.estimation.simultaneous.terms.start_terms import AWAY_SD, CHANGE_SD
+from kinertia.estimation.simultaneous.terms.motion_terms import AWAY_SD, CHANGE_SD
 from kinertia.io.opensim.reader import read_osim
 from kinertia.model.anatomy import segment_of
 from kinertia.model.gait27 import HIP_OFFSETS

@@ -9,7 +9,7 @@ from found import FAULT_FREE, FAULTY, UNUSABLE
 from kinertia.cohort.record import Place, Record
 from kinertia.cohort.tables import write_findings, write_person, write_tables
 from kinertia.errors import BlockedError
-from kinertia.estimation.result import Fit
+from kinertia.estimation.result.fit import Fit
 from kinertia.findings.finding import finding
 from kinertia.findings.where import Where
 from kinertia.io.versions import VERSION

@@ -12,8 +12,8 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.motion.pose_fit import Stop, fit_poses
+from kinertia.synthetic.laboratory import camera_noise
 from kinertia.synthetic.motions import squat
-from kinertia.synthetic.noise import camera_noise
 from kinertia.synthetic.walk import SyntheticSubject, SyntheticTrial, walk
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N, Markers, PlateLoads, Recording

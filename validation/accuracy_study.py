@@ -13,15 +13,15 @@ import numpy as np
 
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.prior import BspPrior
-from kinertia.estimation.simultaneous.observed_trial import Observation
+from kinertia.estimation.simultaneous.observation import Observation
 from kinertia.estimation.simultaneous.search.problem import MapProblem
-from kinertia.estimation.simultaneous.uncertainty.fisher_information import Information
 from kinertia.report.pages.truth_comparison import JOINTS
 from kinertia.studies.parallel import in_parallel
+from kinertia.studies.plan import Information
 from kinertia.studies.sensitivity import Scenario, estimate_person
-from kinertia.synthetic.faults import Faults
+from kinertia.synthetic.motions import Faults
 from kinertia.synthetic.walk import SyntheticTrial
-from kinertia.trial.rms import rms
+from kinertia.trial.sampled_data import rms
 from validation.joint_accuracy import (
     WITHIN,
     Before,

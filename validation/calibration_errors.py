@@ -7,13 +7,13 @@ import numpy as np
 
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
-from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior
+from kinertia.estimation.simultaneous.observation import CalibrationPrior
 from kinertia.estimation.simultaneous.outcome import SimultaneousResult
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.model.gait27 import HIP_OFFSETS
 from kinertia.motion.smoothing import smooth
 from kinertia.studies.sensitivity import held
-from kinertia.synthetic.noise import camera_noise
+from kinertia.synthetic.laboratory import camera_noise
 from kinertia.synthetic.walk import unlike_literature, walk, walking_subject
 from validation.bsp_errors import errors
 from validation.measured_trials import table

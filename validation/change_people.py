@@ -12,30 +12,28 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from kinertia.estimation.change import Change
-from kinertia.estimation.joint_curves import JointCurves
+from kinertia.estimation.changes.change import Change
+from kinertia.estimation.changes.session_changes import changes_between, session, session_features
+from kinertia.estimation.changes.stride_features import Rows, event_means
 from kinertia.estimation.prior import literature_prior
-from kinertia.estimation.result import Fit
-from kinertia.estimation.session_changes import changes_between, session, session_features
+from kinertia.estimation.result.fit import Fit
+from kinertia.estimation.result.trial_fit import JointCurves, TrialFit
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
-from kinertia.estimation.stride_features import Rows, event_means
-from kinertia.estimation.trial_fit import TrialFit
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, inverse_dynamics
 from kinertia.motion.gait_cycle import Stride
 from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.joint_moments import joint_moments
 from kinertia.motion.kinematics import Kinematics
+from kinertia.report.comparison.what_changed import with_markers_anew
 from kinertia.settings import Settings, Subject
-from kinertia.synthetic.laboratory import PERFECT, record
-from kinertia.synthetic.noise import ClusterMotion, SkinMotion, camera_noise
+from kinertia.synthetic.laboratory import PERFECT, ClusterMotion, SkinMotion, camera_noise, record
 from kinertia.synthetic.walk import Manner, SyntheticSubject, SyntheticTrial, walk, walking_subject
 from kinertia.trial.data import LOAD_THRESHOLD_N, Markers
-from kinertia.trial.sampled_time import runs
+from kinertia.trial.sampled_data import runs
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.estimate import estimate
 from kinertia.workflow.prepare import prepare
-from kinertia.workflow.session_fit import with_markers_anew
 
 MARKER_SD_M, SEGMENT_SD_M = 0.005, 0.005
 DRAWS = 40

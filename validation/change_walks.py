@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 from scipy import stats
 
-from kinertia.estimation.change import Change
-from kinertia.estimation.condition_changes import changes_of_strides
-from kinertia.estimation.result import Fit
-from kinertia.estimation.stride_features import Rows, stride_features, usual_sources
+from kinertia.estimation.changes.change import Change
+from kinertia.estimation.changes.condition_changes import changes_of_strides
+from kinertia.estimation.changes.stride_features import Rows, stride_features, usual_sources
+from kinertia.estimation.result.fit import Fit
 from kinertia.workflow.from_files import fit_subject
 
 DRAWS = 80

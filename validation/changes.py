@@ -15,8 +15,8 @@ from typing import Annotated, TypeVar
 import numpy as np
 import typer
 
-from kinertia.estimation.change import Change
-from kinertia.estimation.stride_features import Rows
+from kinertia.estimation.changes.change import Change
+from kinertia.estimation.changes.stride_features import Rows
 from kinertia.studies.parallel import in_parallel
 from validation.change_people import CHANGE_DEG, Judged, Person, person
 from validation.change_walks import (

@@ -28,8 +28,8 @@ import typer
 from kinertia.cohort.job import Job
 from kinertia.cohort.local import local_size
 from kinertia.cohort.people import people_of
-from kinertia.cohort.person import fit_person
 from kinertia.cohort.record import prepare_folder, standings
+from kinertia.cohort.worker import fit_person
 from kinertia.estimation.prior import literature_prior
 from kinertia.synthetic.laboratory import LabNoise, record, write_lab
 from kinertia.synthetic.walk import walk, walking_subject

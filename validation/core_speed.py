@@ -6,8 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pinocchio as pin
 
-from kinertia.motion.dynamics import axis_motion
-from kinertia.motion.regressor import regressor
+from kinertia.motion.dynamics import axis_motion, regressor
 from kinertia.motion.rigid_body import axis_force_derivatives
 from kinertia.synthetic.walk import walk, walking_subject
 from validation.measured_trials import table

@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.fit import fit_simultaneous
-from kinertia.synthetic.noise import SkinMotion, camera_noise
+from kinertia.synthetic.laboratory import SkinMotion, camera_noise
 from kinertia.synthetic.walk import SyntheticTrial, unlike_literature, walk, walking_subject
 from validation.measured_trials import table
 from validation.pinocchio_skeleton import pinocchio_model

@@ -16,7 +16,7 @@ import numpy as np
 
 from kinertia.errors import KinertiaError, findings_of
 from kinertia.estimation.prior import literature_prior
-from kinertia.estimation.result import Fit
+from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.simultaneous.instruments.priors import FLOOR_PRIOR, PLATE_PRIOR
 from kinertia.findings.finding import Finding
 from kinertia.findings.overview import reported

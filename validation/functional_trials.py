@@ -10,14 +10,13 @@ import numpy as np
 import typer
 
 from kinertia.estimation.prior import literature_prior
-from kinertia.estimation.result import Fit
+from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.simultaneous.calibration_entry import AXIS, CalibrationEntry
 from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.settings import Settings, Subject
 from kinertia.studies.parallel import in_parallel
-from kinertia.synthetic.laboratory import PERFECT, record
+from kinertia.synthetic.laboratory import PERFECT, SkinMotion, camera_noise, record
 from kinertia.synthetic.motions import FAST_PACE, squat
-from kinertia.synthetic.noise import SkinMotion, camera_noise
 from kinertia.synthetic.walk import Manner, SyntheticSubject, SyntheticTrial, walk, walking_subject
 from kinertia.trial.data import Markers, Recording
 from kinertia.trial.trial_input import TrialInput

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from kinertia.estimation.trial_fit import TrialFit
+from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.motion.joint_moments import joint_and_side
 from kinertia.report.exports.saved_fit import FIT_FILE, load_fit
 from kinertia.trial.data import FEET, LOAD_THRESHOLD_N
-from kinertia.trial.sampled_time import nearest_samples
+from kinertia.trial.sampled_data import nearest_samples
 from kinertia.trial.trial_input import GAIT
 from validation.field_trials import cases, run
 from validation.measured_data import data_folder

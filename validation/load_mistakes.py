@@ -8,7 +8,7 @@ import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
-from kinertia.trial.sampled_time import runs
+from kinertia.trial.sampled_data import runs
 from validation.marker_mistakes import Change
 from validation.measured_person import MeasuredPerson, acting, loads_of
 

@@ -22,7 +22,7 @@ from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.simultaneous.fit import fit_simultaneous
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import solve_kinematics
-from kinertia.synthetic.noise import SkinMotion, camera_noise
+from kinertia.synthetic.laboratory import SkinMotion, camera_noise
 from kinertia.synthetic.walk import Manner, SyntheticTrial, unlike_literature, walk, walking_subject
 from kinertia.trial.data import FootLoads, Markers, Trial
 from validation.measured_trials import table

@@ -1,6 +1,6 @@
 """Bodies that the tables do not describe, for studies of what a wrong prior costs.
 
-Directions are those of the literature (`kinertia.estimation.population`); sizes are set here, of the order that is told
+Directions are those of the literature (`kinertia.estimation.prior`); sizes are set here, of the order that is told
 there, and are nobody's measurements. People of a population spread about its mean as adults do about theirs.
 """
 

@@ -16,14 +16,12 @@ from functools import partial
 
 import numpy as np
 
-from kinertia.estimation.input_checks import known
 from kinertia.estimation.learnt_prior import FEWEST_PEOPLE, LearntPrior, PersonInformation, learn, person_information
-from kinertia.estimation.population import population_prior
-from kinertia.estimation.prior import BspPrior, literature_prior
+from kinertia.estimation.prepare.prepared import known
+from kinertia.estimation.prior import BspPrior, literature_prior, population_prior
 from kinertia.estimation.simultaneous.fit import calibration_prior
-from kinertia.estimation.simultaneous.instruments.model_uncertainty import GAIT27_UNCERTAINTY
-from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
-from kinertia.estimation.simultaneous.linear_algebra.bandwidth import Bandwidth
+from kinertia.estimation.simultaneous.instruments.priors import GAIT27_UNCERTAINTY, InstrumentPrior
+from kinertia.estimation.simultaneous.linear_algebra.motion_basis import Bandwidth
 from kinertia.estimation.simultaneous.observation import Observations, observe
 from kinertia.estimation.simultaneous.outcome import SimultaneousResult
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
@@ -35,11 +33,11 @@ from kinertia.motion.kinematics import Kinematics
 from kinertia.settings import Attached, Instruments, Subject
 from kinertia.studies.parallel import in_parallel
 from kinertia.studies.sensitivity import WALK_S
-from kinertia.synthetic.faults import Faults, measured
+from kinertia.synthetic.motions import Faults, measured
 from kinertia.synthetic.walk import HEIGHT_M, MASS_KG, SEX, Manner, SyntheticTrial, walk, walking_subject
-from kinertia.trial.rms import rms
-from kinertia.workflow.attached import with_attached_prior
+from kinertia.trial.sampled_data import rms
 from kinertia.workflow.known_body import with_prosthesis
+from kinertia.workflow.masses import with_attached_prior
 from validation.joint_accuracy import WITHIN
 from validation.other_prior import with_prior
 from validation.population_bodies import POPULATIONS

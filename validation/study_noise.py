@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from kinertia.estimation.prior import BspPrior, with_symmetry
-from kinertia.estimation.simultaneous.linear_algebra.bandwidth import Bandwidth
-from kinertia.estimation.simultaneous.observed_trial import Observation
+from kinertia.estimation.simultaneous.linear_algebra.motion_basis import Bandwidth
+from kinertia.estimation.simultaneous.observation import Observation
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.estimation.study_parameters import ParameterVector
 from kinertia.estimation.two_level import Window, estimate_two_level
@@ -17,7 +17,7 @@ from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.motion.smoothing import smooth
 from kinertia.studies.sensitivity import held
 from kinertia.studies.table1 import MARGIN_S, START_SHARE
-from kinertia.synthetic.noise import camera_noise, study_noise
+from kinertia.synthetic.laboratory import camera_noise, study_noise
 from kinertia.synthetic.walk import SyntheticTrial
 from kinertia.trial.data import Markers
 from validation.bsp_errors import errors

@@ -24,7 +24,7 @@ from kinertia.motion.kinematics import Kinematics, solve_kinematics
 from kinertia.synthetic.walk import walking_subject
 from kinertia.trial.data import Recording, Trial
 from kinertia.trial.plate_assignment import build_trial
-from kinertia.trial.sampled_time import runs
+from kinertia.trial.sampled_data import runs
 from kinertia.workflow.built_in_model import calibrate
 from validation.measured_data import data_folder
 

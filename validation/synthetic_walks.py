@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.linear_algebra.bandwidth import Bandwidth
-from kinertia.estimation.simultaneous.observation import observe
-from kinertia.estimation.simultaneous.observed_trial import Observation
+from kinertia.estimation.simultaneous.linear_algebra.motion_basis import Bandwidth
+from kinertia.estimation.simultaneous.observation import Observation, observe
 from kinertia.motion.kinematics import Kinematics, solve_kinematics
 from kinertia.studies.table1 import MARGIN_S, symmetric_truth
 from kinertia.synthetic.walk import SyntheticTrial, walk, walking_subject

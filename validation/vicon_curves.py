@@ -9,8 +9,8 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
-from kinertia.estimation.result import Fit
-from kinertia.motion.joint_wrench import leg_joints
+from kinertia.estimation.result.fit import Fit
+from kinertia.motion.joint_moments import leg_joints
 from kinertia.motion.vicon_points import ViconPoints
 from kinertia.report.pages.vicon_differences import moment_differences
 from kinertia.report.wording import INTERVAL_SD

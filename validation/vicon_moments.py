@@ -12,7 +12,7 @@ import pandas as pd
 import typer
 
 from kinertia.cli.app import main as kinertia
-from kinertia.estimation.result import Fit
+from kinertia.estimation.result.fit import Fit
 from kinertia.report.exports.saved_fit import load_fit
 from kinertia.report.pages.file_outputs import OutputComparison, compared_outputs
 from kinertia.report.pages.vicon_differences import COMPONENTS, corrections

@@ -34,12 +34,12 @@ if TYPE_CHECKING:
     from kinertia.errors import SettingsError as SettingsError
     from kinertia.errors import SubjectError as SubjectError
     from kinertia.errors import TrialError as TrialError
-    from kinertia.estimation.prepared import Prepared as Prepared
+    from kinertia.estimation.prepare.prepared import Prepared as Prepared
     from kinertia.estimation.prior import BspPrior as BspPrior
     from kinertia.estimation.prior import literature_prior as literature_prior
-    from kinertia.estimation.result import Fit as Fit
+    from kinertia.estimation.result.fit import Fit as Fit
+    from kinertia.estimation.result.trial_fit import TrialFit as TrialFit
     from kinertia.estimation.simultaneous.fit import Posterior as Posterior
-    from kinertia.estimation.trial_fit import TrialFit as TrialFit
     from kinertia.findings.extensions import RulePackage as RulePackage
     from kinertia.findings.finding import Finding as Finding
     from kinertia.findings.finding import Severity as Severity
@@ -88,6 +88,7 @@ if TYPE_CHECKING:
     from kinertia.trial.plate_assignment import build_trial as build_trial
     from kinertia.trial.trial_input import TrialInput as TrialInput
     from kinertia.workflow.check import PersonCheck as PersonCheck
+    from kinertia.workflow.check import RecordingCheck as RecordingCheck
     from kinertia.workflow.check import check_person as check_person
     from kinertia.workflow.check import check_recording as check_recording
     from kinertia.workflow.estimate import estimate as estimate
@@ -97,7 +98,6 @@ if TYPE_CHECKING:
     from kinertia.workflow.person import Person as Person
     from kinertia.workflow.person import read_person as read_person
     from kinertia.workflow.prepare import prepare as prepare
-    from kinertia.workflow.recording import RecordingCheck as RecordingCheck
 
 _ROOMS = {
     "errors": (
@@ -125,19 +125,18 @@ _ROOMS = {
     "io.recording": "read_recording",
     "io.subject.reader": "read_subject",
     "io.subject.tables": "SubjectFile",
-    "estimation.prepared": "Prepared",
+    "estimation.prepare.prepared": "Prepared",
     "estimation.prior": "BspPrior literature_prior",
-    "estimation.result": "Fit",
-    "estimation.trial_fit": "TrialFit",
+    "estimation.result.fit": "Fit",
+    "estimation.result.trial_fit": "TrialFit",
     "estimation.simultaneous.fit": "Posterior",
     "diagnostics.model.model_check": "ModelCheck check_model",
     "diagnostics.result.suitability": "Suitability suitability",
     "workflow.estimate": "estimate estimate_bsp",
     "workflow.from_files": "fit_subject prepare_subject",
     "workflow.prepare": "prepare",
-    "workflow.check": "PersonCheck check_person check_recording",
+    "workflow.check": "PersonCheck RecordingCheck check_person check_recording",
     "workflow.person": "Person read_person",
-    "workflow.recording": "RecordingCheck",
     "synthetic.walk": "SyntheticSubject SyntheticTrial walk walking_subject",
     "studies.cross_validation": "HeldOut cross_validate",
     "studies.plan": "Plan plan",

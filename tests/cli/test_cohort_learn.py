@@ -11,10 +11,9 @@ import pytest
 from cohort_kills import in_this_process
 from command_line import run
 from kinertia.estimation.prior import literature_prior
-from kinertia.io.subject.population_file import read_population
+from kinertia.io.subject.learnt_files import read_population, read_session
 from kinertia.io.subject.provenance import recordings
 from kinertia.io.subject.reader import read_subject
-from kinertia.io.subject.session_file import read_session
 from kinertia.report.exports.saved_fit import FIT_FILE, write_fit
 from kinertia.workflow.from_files import prepare_subject
 
@@ -54,8 +53,8 @@ def quick(fit):
         write_fit(fit, provenance, folder / FIT_FILE)
 
     with (
-        mock.patch("kinertia.cohort.person.fit_subject", fitted),
-        mock.patch("kinertia.cohort.person.save_fit", saved),
+        mock.patch("kinertia.cohort.worker.fit_subject", fitted),
+        mock.patch("kinertia.cohort.worker.save_fit", saved),
         mock.patch("kinertia.cli.cohort.fit_here", in_this_process),
         mock.patch("kinertia.cohort.learning.in_parallel", lambda task, cases, *_: [task(one) for one in cases]),
     ):

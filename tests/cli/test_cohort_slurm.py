@@ -11,9 +11,8 @@ import pytest
 import fake_slurm
 from cohort_faults import write_study
 from command_line import PROGRAM, run
-from kinertia.cohort.cluster import run_jobs
+from kinertia.cohort.cluster import ENVIRONMENT, SlurmFile, read_slurm, run_jobs, slurm_cluster
 from kinertia.cohort.job import Job
-from kinertia.cohort.slurm import ENVIRONMENT, SlurmFile, read_slurm, slurm_cluster
 from kinertia.errors import FileError, KinertiaError
 
 
@@ -44,7 +43,7 @@ def test_what_cannot_be_asked_for_says_where(text, line, words, tmp_path):
 def test_without_slurm_it_says_what_to_do(tmp_path, c3d_lab, monkeypatch):
     (tmp_path / "slurm.toml").write_text("", encoding="utf-8")
     (tmp_path / "people.csv").write_text(f"subject\n{c3d_lab / 'subject.toml'}\n", encoding="utf-8")
-    monkeypatch.setattr("kinertia.cohort.slurm.which", lambda name: None)
+    monkeypatch.setattr("kinertia.cohort.cluster.which", lambda name: None)
     command = ("cohort", tmp_path / "people.csv", "-o", tmp_path / "out", "--slurm", tmp_path / "slurm.toml")
     outcome = run(*command)
     assert outcome.status == 2
@@ -65,7 +64,7 @@ def slurm_that(tmp_path, monkeypatch):
     def that(*answers):
         folder = fake_slurm.fake_slurm(tmp_path / "bin", list(answers))
         monkeypatch.setenv("PATH", os.pathsep.join([str(folder), os.environ["PATH"]]))
-        monkeypatch.setattr("kinertia.cohort.slurm.LOOK_S", 0.1)
+        monkeypatch.setattr("kinertia.cohort.cluster.LOOK_S", 0.1)
         return folder
 
     return that
@@ -133,7 +132,7 @@ def _dies_once_and_is_replaced(found, folder, monkeypatch):
     """The first job ends before there is a worker."""
     for name in ("PATH", "SLURM_CONF"):
         monkeypatch.setenv(name, found[name])
-    monkeypatch.setattr("kinertia.cohort.slurm.LOOK_S", 1.0)
+    monkeypatch.setattr("kinertia.cohort.cluster.LOOK_S", 1.0)
     dies_once = f"test -e {folder}/died || {{ touch {folder}/died; exit 1; }}"
     with slurm_cluster(SlurmFile(workers=1, memory_gb=1.0, before=(dies_once,)), 1) as client:
         assert client.submit(abs, -3).result(timeout=120) == 3

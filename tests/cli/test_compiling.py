@@ -12,7 +12,7 @@ _ESTIMATE = """
 from kinertia.cli.compiling import stored_functions
 from kinertia.model.compiled import argument_types
 from kinertia.studies.sensitivity import Scenario, estimate_person
-from kinertia.synthetic.faults import Faults
+from kinertia.synthetic.motions import Faults
 
 estimate_person(0, (Scenario("", Faults("artefact"), walk_s=0.5), 0))
 used = [one for one in stored_functions() if one.signatures]

@@ -9,7 +9,7 @@ import pytest
 
 from command_line import fitted, run
 from kinertia.cli import terminal
-from kinertia.cli.fit_report import report_tables
+from kinertia.cli.findings_view import report_tables
 from kinertia.findings.finding import Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.report.exports.files import summary

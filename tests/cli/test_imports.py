@@ -13,9 +13,8 @@ SELDOM_NAMED = {
     "kinertia.workflow.known_body",
     "kinertia.estimation.learnt_prior",
     "kinertia.workflow.session",
-    "kinertia.io.subject.measures_file",
-    "kinertia.io.subject.population_file",
-    "kinertia.io.subject.session_file",
+    "kinertia.io.subject.body_files",
+    "kinertia.io.subject.learnt_files",
 }
 
 

@@ -7,8 +7,8 @@ import pytest
 
 from command_line import run
 from kinertia.errors import SessionError
+from kinertia.io.subject.learnt_files import PersonInstruments, read_session
 from kinertia.io.subject.reader import read_subject
-from kinertia.io.subject.session_file import PersonInstruments, read_session
 from kinertia.settings import Instruments
 from kinertia.workflow.from_files import check_plates, prepare_subject
 from kinertia.workflow.session import session_instruments

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from kinertia.estimation.asymmetry import BEYOND_SD, asymmetries
 from kinertia.estimation.prior import literature_prior
+from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import BEYOND_SD, asymmetries
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
 from kinertia.synthetic.walk import walking_subject
 

@@ -9,7 +9,7 @@ from kinertia.errors import PriorError
 from kinertia.estimation import body_measures
 from kinertia.estimation.body_measures import expected_measures, measured_body, with_measures
 from kinertia.estimation.prior import literature_prior
-from kinertia.io.subject.measures_file import BodyMeasures, measures_sheet
+from kinertia.io.subject.body_files import BodyMeasures, measures_sheet
 from kinertia.io.subject.tables import PriorFiles
 from kinertia.model.stadium_body import measures
 from kinertia.synthetic.walk import HEIGHT_M, MASS_KG, walking_subject

@@ -16,11 +16,11 @@ from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
 from kinertia.estimation.simultaneous.fit import fit_simultaneous
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
-from kinertia.estimation.simultaneous.uncertainty.model_evidence import Evidence, FreeMomentSign
+from kinertia.estimation.simultaneous.uncertainty.evidence import Evidence, FreeMomentSign
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import Kinematics
-from kinertia.synthetic.noise import camera_noise
+from kinertia.synthetic.laboratory import camera_noise
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.centre_of_pressure import free_moment
 from recordings import slow_beside

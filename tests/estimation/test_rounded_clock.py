@@ -9,7 +9,7 @@ from kinertia.estimation.simultaneous.linear_algebra.motion_basis import MotionB
 from kinertia.io.opensim.reader import read_osim
 from kinertia.settings import Subject
 from kinertia.trial.ground_contact import bridged
-from kinertia.trial.sampled_time import nearest_samples, span_s
+from kinertia.trial.sampled_data import nearest_samples, span_s
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.check import check_recording
 from kinertia.workflow.estimate import estimate_bsp

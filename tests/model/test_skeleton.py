@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from generic_static import generic_model, random_coordinates, smooth_motion
-from kinertia.estimation.calibration import marker_jacobian
+from kinertia.estimation.prepare.calibration import marker_jacobian
 from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.bsp import BodySegmentParameters, transformed_parameters
 from kinertia.model.gait27 import ARM_ROTATIONS, SHOULDER_OFFSETS

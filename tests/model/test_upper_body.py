@@ -6,9 +6,9 @@ import pytest
 from generic_static import generic_model, recording, standing_positions
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.model.anthropometry import reference_lengths
-from kinertia.model.assumptions import assumptions
 from kinertia.model.joint_centres import find_landmarks
 from kinertia.model.skeleton import Marker
+from kinertia.model.static_landmarks import assumptions
 from kinertia.model.upper_body import arm, head_markers, torso_frame, without_head
 
 CLEVELAND = read_marker_set("cleveland-clinic")

@@ -16,12 +16,10 @@ from kinertia.motion.gait_cycle import (
 from kinertia.motion.kinematics import Kinematics, solve_kinematics
 from kinertia.motion.spatiotemporal import _double_support, spatiotemporal
 from kinertia.synthetic.walk import walk, walking_subject
-from kinertia.trial.belt import Belt
 from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, FootLoads, Trial
-from kinertia.trial.file_contents import FileEvent
-from kinertia.trial.gait_events import contradicted_events, sides_exchanged
-from kinertia.trial.rms import rms
-from kinertia.trial.sampled_time import runs
+from kinertia.trial.file_contents import Belt, FileEvent
+from kinertia.trial.sampled_data import rms, runs
+from kinertia.trial.stances import contradicted_events, sides_exchanged
 
 RATE = 100.0
 FRAME = 1.0 / RATE

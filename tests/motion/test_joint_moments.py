@@ -7,8 +7,15 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from kinertia.motion.dynamics import Motion, inverse_dynamics
-from kinertia.motion.joint_moments import component_names, joint_axes, joint_moments
-from kinertia.motion.joint_wrench import VirtualAxes, body_joints, joint_wrenches, lumbar_joint
+from kinertia.motion.joint_moments import (
+    VirtualAxes,
+    body_joints,
+    component_names,
+    joint_axes,
+    joint_moments,
+    joint_wrenches,
+    lumbar_joint,
+)
 from kinertia.synthetic.walk import walk, walking_subject
 
 SIDES = ("r", "l")

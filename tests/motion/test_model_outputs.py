@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.motion.dynamics import Motion, inverse_dynamics
-from kinertia.motion.joint_wrench import joint_wrenches, leg_joints
+from kinertia.motion.joint_moments import joint_wrenches, leg_joints
 from kinertia.motion.model_outputs import Departures, model_outputs
 from kinertia.synthetic.walk import walk, walking_subject
 

@@ -8,8 +8,7 @@ from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.gait27 import HIP_OFFSETS, SHOULDER_OFFSETS
 from kinertia.model.skeleton import Axis, Joint, Skeleton
-from kinertia.motion.dynamics import Motion, axis_motion
-from kinertia.motion.regressor import regressor
+from kinertia.motion.dynamics import Motion, axis_motion, regressor
 from kinertia.motion.rigid_body import axis_force_derivatives, axis_forces
 from pinocchio_model import axis_forces as oracle_forces
 from pinocchio_model import pin, pinocchio_model

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from kinertia.estimation.cycles import cycle_curves
+from kinertia.estimation.result.cycles import cycle_curves
 from kinertia.io.norms_file import Norm
 from kinertia.io.text.sto import read_sto
 from kinertia.motion.dynamics import inverse_dynamics
@@ -359,7 +359,7 @@ def test_estimated_curves_are_near_opensims(next_to_opensim):
 
 def test_a_report_without_clinical_angles(fit, monkeypatch):
     """A knee axis that is not across the leg has none: the fit ended with an internal error."""
-    monkeypatch.setattr("kinertia.estimation.cycles.clinical_angles", lambda *given: {"r": {}, "l": {}})
+    monkeypatch.setattr("kinertia.estimation.result.cycles.clinical_angles", lambda *given: {"r": {}, "l": {}})
     figures = cycle_figures(fit)
     assert "clinical" not in figures
     assert "moment" in figures

@@ -30,8 +30,8 @@ from kinertia.report.figures.time_figures import (
 from kinertia.report.pages.page import render
 from kinertia.report.wording import LITERATURE
 from kinertia.trial.data import FootLoads, Markers, Trial
-from kinertia.trial.gait_events import gait_events
-from kinertia.trial.rms import rms_by_marker
+from kinertia.trial.sampled_data import rms_by_marker
+from kinertia.trial.stances import gait_events
 from report_page import TRACE_TYPES, figures_of, numbers
 
 

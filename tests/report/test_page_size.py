@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.estimation.joint_curves import JointCurves
+from kinertia.estimation.result.trial_fit import JointCurves
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
 from kinertia.motion.dynamics import Motion
 from kinertia.report.pages.page import MOST_TRIALS, render

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kinertia.estimation.prior import literature_prior
-from kinertia.synthetic.faults import CAMERA_SD_M, Faults, measured, tilted
+from kinertia.synthetic.motions import CAMERA_SD_M, Faults, measured, tilted
 from kinertia.synthetic.walk import walk, walking_subject
 from one_process import in_one_process
 from validation.accuracy_study import (

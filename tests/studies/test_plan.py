@@ -10,8 +10,7 @@ from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.fit import fit_simultaneous
 from kinertia.motion.dynamics import residual
 from kinertia.studies.plan import Plan, plan_measured, plan_synthetic
-from kinertia.synthetic.faults import Faults, measured
-from kinertia.synthetic.motions import MOTIONS, squat
+from kinertia.synthetic.motions import MOTIONS, Faults, measured, squat
 from kinertia.synthetic.walk import centre_of_pressure, walk, walking_subject
 
 

@@ -9,7 +9,7 @@ from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
 from kinertia.estimation.simultaneous.mixture_prior import FaultMixture
 from kinertia.estimation.simultaneous.search.problem import MapProblem
-from kinertia.estimation.simultaneous.uncertainty.fisher_information import Information
+from kinertia.studies.plan import Information
 from kinertia.studies.sensitivity import held
 from kinertia.synthetic.walk import walking_subject
 from validation import study_bound

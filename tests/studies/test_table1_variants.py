@@ -36,7 +36,7 @@ from kinertia.studies.table1_variants import (
     stopped_by,
     trust_region,
 )
-from kinertia.synthetic.noise import camera_noise, displaced, study_noise
+from kinertia.synthetic.laboratory import camera_noise, displaced, study_noise
 from kinertia.synthetic.walk import balancing_wrench
 from one_process import in_one_process
 

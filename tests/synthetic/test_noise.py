@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.synthetic.noise import (
+from kinertia.synthetic.laboratory import (
     ARTEFACT_RANGE_M,
     OTHER_ARTEFACT_RANGE_M,
     STRIDE_S,

@@ -3,7 +3,7 @@ import pytest
 
 from kinertia.errors import MarkerSetError
 from kinertia.trial.data import FootLoads, Markers, PlateLoads, Trial
-from kinertia.trial.sampled_time import runs, windows
+from kinertia.trial.sampled_data import runs, windows
 
 
 def markers(n=11, labels=("a", "b")):

@@ -11,7 +11,7 @@ from kinertia.trial.data import FootLoads, Markers, PlateLoads, Recording
 from kinertia.trial.file_contents import StatedContact
 from kinertia.trial.ground_contact import CONTACT_MARGIN_S, CONTACT_SLACK_S, ground_contact
 from kinertia.trial.plate_assignment import assign_plates, build_trial
-from kinertia.trial.sampled_time import runs, within
+from kinertia.trial.sampled_data import runs, within
 from recordings import is_here
 from walk_on_plates import ALL_STEPS, FEET, walk
 

@@ -9,14 +9,13 @@ import pytest
 
 from kinertia import Settings, Subject, TrialInput, estimate, prepare, prepare_subject
 from kinertia.errors import BlockedError, SettingsError
-from kinertia.estimation.drawn_fit import kept_draws
+from kinertia.estimation.result.drawn_fit import kept_draws
 from kinertia.estimation.simultaneous.calibration_entry import AXIS
 from kinertia.io.text.trc import write_trc
 from kinertia.model.gait27 import LEG_AXIS_TILTS
 from kinertia.report.exports.draw_files import write_draws
-from kinertia.synthetic.laboratory import LabNoise, record, write_lab
+from kinertia.synthetic.laboratory import LabNoise, SkinMotion, camera_noise, record, write_lab
 from kinertia.synthetic.motions import squat
-from kinertia.synthetic.noise import SkinMotion, camera_noise
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.data import Recording
 from kinertia.workflow.check import check_person

@@ -8,10 +8,10 @@ from pydantic import ValidationError
 
 from kinertia.errors import PriorError
 from kinertia.estimation.learnt_prior import LearntPrior
-from kinertia.estimation.prepared import Prepared
+from kinertia.estimation.prepare.prepared import Prepared
 from kinertia.estimation.prior import literature_prior
-from kinertia.estimation.simultaneous.instruments.model_uncertainty import GAIT27_UNCERTAINTY
-from kinertia.io.subject.bsp_file import BspTable
+from kinertia.estimation.simultaneous.instruments.priors import GAIT27_UNCERTAINTY
+from kinertia.io.subject.body_files import BspTable
 from kinertia.model.bsp import PARAMETERS
 from kinertia.settings import KnownSegment, PriorSettings
 from kinertia.synthetic.walk import walking_subject

@@ -9,12 +9,12 @@ from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.fit import calibration_prior
 from kinertia.estimation.simultaneous.instruments.plates import PLATE_UNKNOWNS, plates_with_floor
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentInformation, InstrumentPrior
-from kinertia.estimation.simultaneous.linear_algebra.bandwidth import Bandwidth
+from kinertia.estimation.simultaneous.linear_algebra.motion_basis import Bandwidth
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.observation import observe
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.studies.sensitivity import MOTIONS
-from kinertia.synthetic.faults import Faults, measured
+from kinertia.synthetic.motions import Faults, measured
 from kinertia.synthetic.walk import walk, walking_subject
 
 GAIN = list(PLATE_UNKNOWNS).index("gain")

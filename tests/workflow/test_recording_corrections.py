@@ -11,8 +11,7 @@ from kinertia.io.opensim.reader import read_osim
 from kinertia.settings import Subject
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.person import Person
-from kinertia.workflow.recording_corrections import with_model_spelling, with_upright_static
-from kinertia.workflow.screening import screen
+from kinertia.workflow.screening import screen, with_model_spelling, with_upright_static
 from refusals import codes
 
 OTHER_AXES = {

@@ -13,9 +13,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from kinertia import Settings, Subject, TrialInput, estimate, prepare
-from kinertia.model.skin_angles import skin_angles
-from kinertia.synthetic.laboratory import PERFECT, record
-from kinertia.synthetic.noise import SkinMotion, camera_noise
+from kinertia.model.coordinate_pairs import skin_angles
+from kinertia.synthetic.laboratory import PERFECT, SkinMotion, camera_noise, record
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.data import Markers, Recording
 

@@ -4,20 +4,25 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from kinertia.errors import BlockedError
 from kinertia.findings.finding import Severity
 from kinertia.findings.rule import STAGES
+from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.recording import read_recording
 from kinertia.io.subject.reader import read_subject
 from kinertia.io.text.sto import read_sto, write_sto
 from kinertia.io.text.trc import write_trc
-from kinertia.settings import Overrule
+from kinertia.settings import Overrule, Settings, Subject
+from kinertia.trial.data import Markers, Recording
+from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.check import check_person
 from kinertia.workflow.from_files import prepare_subject
-from kinertia.workflow.person import read_person
-from kinertia.workflow.screening import screen
+from kinertia.workflow.person import Person, read_person
+from kinertia.workflow.prepare import prepared
+from kinertia.workflow.screening import screen, with_widths
 from recordings import FITTED, is_here, slow_beside
 from refusals import expect_filled
 from synthetic_lab import WITH_MODEL, synthetic_arguments
@@ -27,9 +32,15 @@ from validation.measured_data import data_folder
 from validation.walks import fit_arguments
 
 SCREENED = STAGES[: STAGES.index("person") + 1]
+
+
 _SUBJECT4 = "subject4/walking1"
+
+
 PEOPLE = [*FITTED, "synthetic with model", *(["subject4"] if is_here(f"{_SUBJECT4}.trc") else [])]
 """Names of `walks.WALKS`, the synthetic laboratory's, and two with their own OpenSim models."""
+
+
 FIELD = [one for one in cases(data_folder()) if one.arguments[0] == "fit"] if is_here(f"{_SUBJECT4}.trc") else []
 
 
@@ -193,3 +204,51 @@ def test_a_static_trial_that_cannot_be_read_stops_everything(tmp_path, synthetic
     (found,) = blocked.value.blocking
     assert (found.code, found.where.file, found.where.line, found.where.trial) == ("F104", "static.trc", 2, None)
     assert checked.overview.left_out == ()
+
+
+SET = read_marker_set("plug-in-gait")
+
+
+def recording(name, **measurements):
+    return Recording(name, Markers(np.zeros(1), ("A",), np.zeros((1, 1, 3))), measurements=measurements)
+
+
+def widths(static, trials, **given):
+    static_with_widths, marker_set = with_widths(static, trials, SET, Subject(name="A", **given))
+    known = {joint: static_with_widths.measurements.get(name) for joint, name in marker_set.widths.items()}
+    borrowed = [(one.code, one.where.part, one.where.file) for one in static_with_widths.findings]
+    return {joint: value for joint, value in known.items() if value}, borrowed
+
+
+def test_the_static_trial_goes_before_others_and_the_subject_file_before_both():
+    static = recording("static", RKneeWidth=0.10)
+    walk = recording("walk", RKneeWidth=0.2, LKneeWidth=0.11, LAnkleWidth=0.07)
+    by_joint, borrowed = widths(static, [recording("empty"), walk])
+    assert by_joint == {"knee_r": 0.10, "knee_l": 0.11, "ankle_l": 0.07}
+    assert borrowed == [("S105", "left knee", "walk"), ("S105", "left ankle", "walk")]
+    by_joint, borrowed = widths(static, [walk], knee_width_mm=95.0)
+    assert by_joint == {"knee_r": 0.095, "knee_l": 0.095, "ankle_l": 0.07}
+    assert borrowed == [("S105", "left ankle", "walk")]
+
+
+def test_a_set_that_names_no_widths_takes_those_of_the_subject_file():
+    unnamed = replace(SET, widths={})
+    static, marker_set = with_widths(recording("static"), [], unnamed, Subject(name="A", ankle_width_mm=70.0))
+    assert {joint: static.measurements[name] for joint, name in marker_set.widths.items()} == pytest.approx(
+        {"ankle_r": 0.07, "ankle_l": 0.07}
+    )
+
+
+def test_the_model_has_the_widths_of_the_subject_file(measured_folder):
+    """The static trial has widths of its own, of 105 mm at the knees."""
+    folder = measured_folder / "pig_c3d"
+    static, walk = (read_recording(folder / f"subject_b_{name}.c3d") for name in ("static", "walk"))
+
+    def shank_m(**given):
+        subject = Subject(name="B", mass_kg=47.5, height_m=1.505, sex="female", **given)
+        skeleton = prepared(screen(Person(subject, [TrialInput(walk)], static)), Settings(joint_axes=False)).skeleton
+        return {joint.child: np.array(joint.translation) for joint in skeleton.joints}["shank_r"]
+
+    usual, same, wide = shank_m(), shank_m(knee_width_mm=105.0), shank_m(knee_width_mm=140.0)
+    assert same == pytest.approx(usual, abs=1e-9)
+    assert np.linalg.norm(wide - usual) > 0.002

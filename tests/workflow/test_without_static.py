@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.errors import BlockedError
-from kinertia.estimation.simultaneous.instruments.model_uncertainty import WITHOUT_STATIC
+from kinertia.estimation.simultaneous.instruments.priors import WITHOUT_STATIC
 from kinertia.io.recording import read_recording
 from kinertia.model.gait27 import LEG_AXIS_TILTS
 from kinertia.settings import Settings, Subject

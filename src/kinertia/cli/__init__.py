@@ -1,1 +1,1 @@
-"""Defines the command line: one module per command, and what they share; `web` is the page in the browser."""
+"""Defines the command line: a module per command or two, and what they share; `web` is the page in the browser."""

@@ -1,21 +1,26 @@
-"""Lists the commands of the command line, loads each when it is called, and keeps former names working."""
+"""Lists the commands, loads each when it is called, and describes internal errors in one line and a log file."""
 
+import platform
 import signal
 import sys
+import tempfile
 import threading
+import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Annotated, Any, NoReturn, cast
 
 import typer
 
-from kinertia.cli.failure import STATUS, failure_text
-from kinertia.cli.outcome import add_command, of_error
+from kinertia.cli.options import add_command, of_error
 from kinertia.cli.terminal import err, out, print_json, show_error, show_problem
-from kinertia.errors import KinertiaError
+from kinertia.errors import KinertiaError, internal_error
 from kinertia.findings.extensions import ExtensionError
 from kinertia.io.results.output_folder import INTERRUPTIONS
+from kinertia.io.subject.provenance import command_line
 from kinertia.io.versions import VERSION
 
 # typer keeps these line ends: at most 78 columns
@@ -74,12 +79,12 @@ _MODULES = {
     "explain": "explain",
 }
 _MORE = {
-    "markers": "markers",
+    "markers": "init",
     "report": "report",
     "crossval": "plan",
     "plan": "plan",
     "instruments": "instruments",
-    "norms": "norms",
+    "norms": "population",
     "population": "population",
     "study": "study",
     "warm-up": "warm_up",
@@ -89,6 +94,9 @@ RENAMED = {"--force": "--overwrite"}
 """Old names, each with what it is called now; they go with the next version."""
 MOVED = {f"study {name}": f"python -m validation {name}" for name in ("accuracy", "faults", "populations")}
 """Commands that are no longer installed, each with what to run in a clone of the repository."""
+STATUS = 70
+"""EX_SOFTWARE of sysexits.h: the fault is the program's."""
+_PACKAGES = ("numpy", "scipy", "numba", "pandas", "ezc3d", "pydantic", "typer", "rich")
 
 
 def application(only: str | None = None) -> typer.Typer:
@@ -224,3 +232,36 @@ def as_named_now(given: Sequence[str]) -> list[str]:
     for old in [name for name in RENAMED if name in given]:
         err.print(f"{old} is now {RENAMED[old]}; the old name will be removed in the next version")
     return [RENAMED.get(one, one) for one in given]
+
+
+def failure_text(error: Exception, given: Sequence[str]) -> str:
+    """Log an internal error of Kinertia, and describe it and where its log is."""
+    return internal_error(error, _logged(error, given) or "this line and your command")
+
+
+def _logged(error: Exception, given: Sequence[str]) -> Path | None:
+    """Write the log file: command, versions and traceback; None where no file can be written."""
+    text = "\n".join(
+        [
+            command_line(["kinertia", *given]),
+            f"kinertia {VERSION}, Python {platform.python_version()}, {platform.platform()}",
+            ", ".join(f"{name} {_installed(name)}" for name in _PACKAGES),
+            "",
+            "".join(traceback.format_exception(error)),
+        ]
+    )
+    try:
+        with tempfile.NamedTemporaryFile(
+            "w", prefix="kinertia-failure-", suffix=".log", delete=False, encoding="utf-8", errors="backslashreplace"
+        ) as file:
+            file.write(text)
+    except OSError:
+        return None
+    return Path(file.name)
+
+
+def _installed(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "missing"

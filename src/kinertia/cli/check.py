@@ -17,6 +17,7 @@ from kinertia.cli.options import (
     Loads,
     MarkerSetName,
     Mass,
+    Outcome,
     Overwrite,
     Quiet,
     ScaledModel,
@@ -27,7 +28,6 @@ from kinertia.cli.options import (
     overrule_of,
     results_folder,
 )
-from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.errors import FileError
 from kinertia.findings.overview import Overview
@@ -41,6 +41,7 @@ from kinertia.settings import Subject
 from kinertia.workflow.check import (
     ModelOverview,
     PersonCheck,
+    RecordingCheck,
     RecordingFiles,
     check_osim,
     check_person,
@@ -49,7 +50,6 @@ from kinertia.workflow.check import (
     trial_names,
 )
 from kinertia.workflow.person import Person, Progress, read_person
-from kinertia.workflow.recording import RecordingCheck
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,22 +14,28 @@ from typing import Annotated, Any
 
 import typer
 
-from kinertia.cli.options import Output, Overwrite, Quiet, results_folder
-from kinertia.cli.outcome import Outcome
+from kinertia.cli.options import Outcome, Output, Overwrite, Quiet, results_folder
 from kinertia.cli.terminal import be_quiet, finite, out, plain_table, shown_progress
-from kinertia.cohort.cluster import doubts_of_workers, expect_extra, run_jobs, running_cluster
+from kinertia.cohort.cluster import (
+    SlurmFile,
+    doubts_of_workers,
+    expect_extra,
+    read_slurm,
+    run_jobs,
+    running_cluster,
+    slurm_cluster,
+)
 from kinertia.cohort.job import Finished, Job, guessed_seconds, note_resources
 from kinertia.cohort.learning import FOLDER as LEARNT
 from kinertia.cohort.learning import write_second_study
 from kinertia.cohort.local import fit_here, local_size
 from kinertia.cohort.page import write_cohort_page
 from kinertia.cohort.people import Participant, people_of
-from kinertia.cohort.person import fit_person
 from kinertia.cohort.record import Record, Standing, keep, prepare_folder, standings
-from kinertia.cohort.slurm import SlurmFile, read_slurm, slurm_cluster
 from kinertia.cohort.tables import write_tables
+from kinertia.cohort.worker import fit_person
 from kinertia.errors import SettingsError
-from kinertia.estimation.gait_profile import expect_all_nine
+from kinertia.estimation.result.gait_profile import expect_all_nine
 from kinertia.io.norms_file import Norm, read_norms
 from kinertia.io.results.working_folder import sole_use
 

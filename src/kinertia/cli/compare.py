@@ -5,13 +5,12 @@ from typing import Annotated
 
 import typer
 
-from kinertia.cli.options import Overwrite, Quiet, results_folder
-from kinertia.cli.outcome import Outcome
+from kinertia.cli.options import Outcome, Overwrite, Quiet, results_folder
 from kinertia.cli.terminal import out, shown_progress
 from kinertia.errors import KinertiaError
-from kinertia.estimation.prepared import Progress
-from kinertia.estimation.result import Fit
-from kinertia.estimation.session_changes import why_incomparable
+from kinertia.estimation.changes.session_changes import why_incomparable
+from kinertia.estimation.prepare.prepared import Progress
+from kinertia.estimation.result.fit import Fit
 from kinertia.io.results.output_folder import complete_folder
 from kinertia.io.subject.provenance import names_from_common_folder
 from kinertia.report.comparison.change_tables import change_columns, curve_columns

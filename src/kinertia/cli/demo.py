@@ -14,13 +14,11 @@ import numpy as np
 import pandas as pd
 import typer
 
-from kinertia.cli.findings_view import show_overview
-from kinertia.cli.fit_report import show_coverage
-from kinertia.cli.options import Output, Overwrite, Quiet, results_folder
-from kinertia.cli.outcome import Outcome
+from kinertia.cli.findings_view import show_coverage, show_overview
+from kinertia.cli.options import Outcome, Output, Overwrite, Quiet, results_folder
 from kinertia.cli.terminal import out, plain_table, shown_progress
-from kinertia.estimation.prepared import Progress
-from kinertia.estimation.result import Fit
+from kinertia.estimation.prepare.prepared import Progress
+from kinertia.estimation.result.fit import Fit
 from kinertia.io.results.output_folder import complete_folder
 from kinertia.io.samples import SHA256, sample_walk
 from kinertia.io.subject.person_recordings import read_inputs

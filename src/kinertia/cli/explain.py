@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from kinertia.cli.outcome import Outcome
+from kinertia.cli.options import Outcome
 from kinertia.cli.terminal import out
 from kinertia.diagnostics.limits import with_limits
 from kinertia.errors import SettingsError

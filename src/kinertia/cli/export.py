@@ -6,8 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from kinertia.cli.options import Overwrite, Quiet, results_folder
-from kinertia.cli.outcome import Outcome
+from kinertia.cli.options import Outcome, Overwrite, Quiet, results_folder
 from kinertia.cli.terminal import out
 from kinertia.io.results.output_folder import complete_folder
 from kinertia.io.versions import VERSION

@@ -1,13 +1,28 @@
-"""Prints findings on a terminal: the verdict, at most three findings, or all of them with `--verbose`."""
+"""Prints findings, and the outcome of a fit, on a terminal."""
+
+from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
 
-from kinertia.cli.terminal import out
+from kinertia.cli.terminal import out, plain_table
 from kinertia.errors import KinertiaError, findings_of
+from kinertia.estimation.identifiability import evidence
+from kinertia.estimation.result.fit import Fit
+from kinertia.estimation.result.leg_moments import coverage_sentence
 from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.overview import Group, Overview, consequences, grouped, in_order, reported
 from kinertia.findings.rule import STAGES, matching, rule
+from kinertia.report.exports.files import summary
+from kinertia.report.wording import start_of
+
+if TYPE_CHECKING:
+    from rich.table import Table
+from pathlib import Path
+
+from kinertia.io.subject.provenance import command_line
+from kinertia.io.subject.tables import Model
 
 _SHOWN = 3
 _STYLES = {
@@ -17,6 +32,10 @@ _STYLES = {
     Severity.INFO: "dim",
 }
 _WHY_NOT = {True: "an ERROR that cannot be waived", False: "no ERROR here"}
+_MARKS = {"measured": "**", "informed": "*", "assumed": "", "held": ""}
+_STAGES = ("literature", "corrected", "estimate")
+_NO_MARKER_SET = {"L101", "L105"}
+_DRAFT = "markers.toml"
 
 
 def show_overview(overview: Overview, verbose: bool) -> None:
@@ -82,3 +101,119 @@ def _show_line(group: Group) -> None:
     overruled = "" if first.status == "open" else f" [{first.status}]"
     label = Text(f"{first.severity.name}{overruled}  ", style=_STYLES[first.severity])
     out.print(label.append(group.line, style="not bold default"), soft_wrap=True)
+
+
+def show_coverage(fit: Fit) -> None:
+    """Show in which part of each leg's stride joint moments are known, in one line."""
+    if covered := coverage_sentence(fit.trials):
+        out.print(f"joint moments {covered}", soft_wrap=True)
+
+
+def report_tables(fit: Fit) -> None:
+    """Show person and method, residuals of every trial, the table of segments, and masses."""
+    fit_summary = summary(fit)
+    subject, mass = fit_summary["subject"], fit_summary["total_mass_kg"]
+    height = None if subject["height_m"] is None else f"{subject['height_m']:g} m"
+    person = ", ".join(filter(None, [f"{subject['mass_kg']:g} kg", height, subject["sex"]]))
+    out.print(f"\n{subject['name']}: {person}; method {fit_summary['method']}; {fit.notes[0]}")
+    for trial in fit_summary["trials"]:
+        _report_trial(trial, start_of(fit).word)
+    out.print(_bsp_table(fit))
+    if fit.posterior is not None:
+        out.print(
+            "** well informed by the data, * partly informed, no mark: not informed (about as uncertain as the prior, "
+            "even where the value changed); sd: standard deviation\n"
+        )
+    named = {"measured": "stated", "literature": start_of(fit).word}
+    masses = ", ".join(f"{named.get(source, source)} {value:.1f}" for source, value in mass.items())
+    beside = f", {fit.attached_kg:.1f} of it not body" if fit.attached_kg else ""
+    out.print(f"total mass (kg): {masses}{beside}\n")
+    if fit_summary["asymmetry"]:
+        out.print(f"left and right: {'; '.join(fit_summary['asymmetry'])}\n")
+    for note in fit.notes:
+        out.print(f"assumed: {note}", soft_wrap=True)
+    for trial in fit.trials:
+        spent = ", ".join(f"{stage} {seconds:.1f}" for stage, seconds in trial.seconds.items())
+        out.print(f"{trial.name}: seconds: {spent}")
+
+
+def _report_trial(trial: dict[str, Any], before: str) -> None:
+    (first, last), parts = trial["window_s"], len(trial["windows_s"])
+    intervals = f" in {parts} measured intervals" if parts > 1 else ""
+    markers = {stage: f"{value * 1e3:.1f} mm" for stage, value in trial["marker_rms_m"].items()}
+    out.print(
+        f"\n{trial['name']}: {first:.3f} to {last:.3f} s used{intervals}, {trial['n_dynamic_frames']} of "
+        f"{trial['n_frames']} frames; RMS distance of the markers {markers['ik']} (inverse kinematics), "
+        f"{markers['final']} (estimate)"
+    )
+    if trial["residual_force_rms_N"]["estimate"] is None:
+        out.print(" no residual at the pelvis: all ground contact is never measured together")
+        return
+    hz = {**dict.fromkeys(_STAGES, trial["cutoff_hz"]), "estimate": trial["motion_hz"]}
+    title = "residual at the pelvis, RMS (max),\nforces at the motion's bandwidth"
+    names = {stage: before if stage == "literature" else stage for stage in _STAGES}
+    table = plain_table(title, *(f"{name}\n{hz[stage]:.3g} Hz" for stage, name in names.items()))
+    for kind, unit in (("force", "N"), ("moment", "Nm")):
+        rms, top = trial[f"residual_{kind}_rms_{unit}"], trial[f"residual_{kind}_max_{unit}"]
+        table.add_row(f"{kind} ({unit.replace('Nm', 'N m')})", *(f"{rms[s]:.1f} ({top[s]:.1f})" for s in _STAGES))
+    out.print(table)
+    sizes = ("force_rms_N", "force_max_N", "moment_rms_Nm", "moment_max_Nm")
+    full = [f"{trial[f'full_residual_{size}']['estimate']:.1f}" for size in sizes]
+    out.print(
+        " estimate with forces at full bandwidth (what OpenSim finds on these files):\n"
+        f" force {full[0]} ({full[1]}) N, moment {full[2]} ({full[3]}) N m"
+    )
+
+
+def _bsp_table(fit: Fit) -> Table:
+    """Tabulate two rows per segment, three with error bars; if left mirrors right, the right side stands for both."""
+    table = plain_table("segment", "", "mass\n(kg)", "CoM x\n(mm)", "y", "z", "Ixx\n(kg m2)", "Iyy", "Izz")
+    for i, segment in enumerate(fit.literature.segments):
+        if fit.posterior is None and fit.settings.symmetry and segment.endswith("_l"):
+            continue
+        for source, bsp in ((start_of(fit).word, fit.literature), ("estimate", fit.estimate)):
+            com = (f"{round(value * 1e3)}" for value in bsp.com_m[i])
+            inertia = (f"{value:.4f}" for value in bsp.inertia_kgm2[i].diagonal())
+            cells = [f"{bsp.mass_kg[i]:.2f}", *com, *inertia]
+            if source == "estimate" and fit.posterior is not None:
+                cells = [
+                    cell + _MARKS[evidence(a)] for cell, a in zip(cells, fit.posterior.information[i], strict=False)
+                ]
+            table.add_row(segment, source, *cells)
+            segment = ""
+        if fit.posterior is not None and not fit.posterior.prior_sd[i].any():
+            table.add_row("", "sd", "fixed")
+        elif fit.posterior is not None:
+            sd = fit.posterior.sd[i]
+            table.add_row(
+                "", "sd", f"{sd[0]:.2f}", *(f"{v * 1e3:.0f}" for v in sd[1:4]), *(f"{v:.4f}" for v in sd[4:7])
+            )
+    return table
+
+
+def next_commands(error: KinertiaError, given: Path, model: Model, command: str) -> list[str]:
+    """List the next commands in order; empty where another marker set would not help, or one was stated.
+
+    Args:
+        error: the reason why there is no fit.
+        given: the subject file, its folder, or the markers of a trial.
+        model: the model as stated in the subject file, or in options.
+        command: the command that failed.
+    """
+    if not _NO_MARKER_SET & {one.code for one in findings_of(error)}:
+        return []
+    if model.static is None or model.markers is not None or model.osim is not None:
+        return []
+    folder = given if given.is_dir() else given.parent
+    by_file = given.is_dir() or given.suffix.lower() == ".toml"
+    drafted = folder / _DRAFT if by_file else Path(_DRAFT)
+    draft = command_line(["kinertia", "markers", _as_typed(model.static), "-o", str(drafted)])
+    if by_file:
+        return [draft, f'put markers = "{_DRAFT}" under [model] of the subject file', command]
+    return [draft, f"{command} --markers {_DRAFT}"]
+
+
+def _as_typed(path: Path) -> str:
+    """Return the path relative to the shell's folder where it is in it."""
+    here = Path.cwd()
+    return str(path.relative_to(here)) if path.is_relative_to(here) else str(path)

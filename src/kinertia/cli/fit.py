@@ -8,8 +8,14 @@ from typing import Annotated, Any, get_args
 import numpy as np
 import typer
 
-from kinertia.cli.findings_view import show_idle_waivers, show_overview, waivers_reported
-from kinertia.cli.fit_report import next_commands, report_tables, show_coverage
+from kinertia.cli.findings_view import (
+    next_commands,
+    report_tables,
+    show_coverage,
+    show_idle_waivers,
+    show_overview,
+    waivers_reported,
+)
 from kinertia.cli.options import (
     Calibrate,
     Forces,
@@ -17,6 +23,7 @@ from kinertia.cli.options import (
     Loads,
     MarkerSetName,
     Mass,
+    Outcome,
     Output,
     Overwrite,
     Quiet,
@@ -25,13 +32,13 @@ from kinertia.cli.options import (
     Static,
     Verbose,
     Waive,
+    of_error,
     overrule_of,
     results_folder,
 )
-from kinertia.cli.outcome import Outcome, of_error
 from kinertia.cli.terminal import out, show_problem, shown_progress
 from kinertia.errors import FileError, KinertiaError
-from kinertia.estimation.result import Fit
+from kinertia.estimation.result.fit import Fit
 from kinertia.io.file_names import same_folder
 from kinertia.io.recording import expect_recording
 from kinertia.io.subject.provenance import command_line, provenance_of

@@ -7,15 +7,14 @@ from typing import Annotated
 import typer
 
 from kinertia.cli.findings_view import show_all
-from kinertia.cli.options import Quiet, own_file
-from kinertia.cli.outcome import Outcome
+from kinertia.cli.options import Outcome, Quiet, own_file
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.errors import FileError, SessionError
 from kinertia.estimation.simultaneous.calibration_entry import SHOWN_UNIT
 from kinertia.io.results.output_folder import write_then_rename
+from kinertia.io.subject.learnt_files import expect_session, session_text
 from kinertia.io.subject.provenance import recordings
 from kinertia.io.subject.reader import read_subject
-from kinertia.io.subject.session_file import expect_session, session_text
 from kinertia.io.subject.tables import InstrumentsFiles, SubjectFile
 from kinertia.io.versions import VERSION
 from kinertia.workflow.from_files import check_plates, fit_subject

@@ -5,8 +5,7 @@ from typing import Annotated
 
 import typer
 
-from kinertia.cli.options import Output, Overwrite, Quiet, results_folder
-from kinertia.cli.outcome import Outcome
+from kinertia.cli.options import Outcome, Output, Overwrite, Quiet, results_folder
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.io.subject.reader import read_subject
 from kinertia.report.pages.plan_page import (

@@ -1,27 +1,61 @@
-"""Defines `kinertia population`: learns the mean and spread of BSPs from the fits of a group."""
+"""Defines `kinertia population` and `kinertia norms`: what the fits of a group teach about other people."""
 
-from dataclasses import replace
+import csv
+import io
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import typer
 
-from kinertia.cli.options import Quiet, own_file
-from kinertia.cli.outcome import Outcome
-from kinertia.cli.results_of_people import PersonResults, results_of_people
+from kinertia.cli.options import Outcome, Quiet, own_file
 from kinertia.cli.terminal import out, plain_table, shown_progress
-from kinertia.errors import KinertiaError, PriorError
+from kinertia.cohort.tables import fitted_people
+from kinertia.errors import FileError, KinertiaError, PriorError
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.learnt_prior import LearntPrior, PersonInformation, information_of, learn
+from kinertia.estimation.result.fit import Fit
+from kinertia.estimation.result.gait_profile import Control, band_columns, mixture
+from kinertia.io.norms_file import read_norms
 from kinertia.io.recording import MARKER_FILES
 from kinertia.io.results.output_folder import write_then_rename
-from kinertia.io.subject.population_file import population_text, read_population
+from kinertia.io.subject.learnt_files import population_text, read_population
+from kinertia.io.text.csv_file import inert
 from kinertia.io.versions import VERSION
 from kinertia.model.bsp import PARAMETERS
-from kinertia.report.exports.saved_fit import SavedFit, read_saved
+from kinertia.report.exports.saved_fit import FIT_FILE, SavedFit, read_saved
 
 _SHOWN = 12
+
+
+@dataclass(frozen=True)
+class PersonResults:
+    """Folder of one person's results, and the person's name in a cohort; None in results of `kinertia fit`."""
+
+    folder: Path
+    name: str | None = None
+
+
+def results_of_people(results: list[Path]) -> list[PersonResults]:
+    """List every person's results in these folders, each once; reports those that a cohort no longer lists."""
+    found: list[PersonResults] = []
+    for path in results:
+        if (path / FIT_FILE).is_file():
+            found.append(PersonResults(path))
+        elif people := sorted(path.glob(f"people/*/{FIT_FILE}")):
+            listed = fitted_people(path)
+            for folder in (one.parent for one in people):
+                if listed is None or inert(folder.name) in listed:
+                    found.append(PersonResults(folder, folder.name))
+                else:
+                    older = "has no current results according to people.csv, only older ones"
+                    out.print(f"left out: {folder.name}: {older}", soft_wrap=True)
+        elif people := sorted(path.glob(f"*/{FIT_FILE}")):
+            found += [PersonResults(one.parent) for one in people]
+        else:
+            raise FileError(path, "holds no results of kinertia cohort or kinertia fit")
+    return list(dict.fromkeys(found))
 
 
 def population(
@@ -118,3 +152,74 @@ def _report(learnt: LearntPrior) -> None:
         f"{learnt.people} people; means relative to the literature, in its standard deviations, clearest first; "
         f"parameters of another person, by the group's information: {counts}"
     )
+
+
+def norms(
+    results: Annotated[
+        list[Path],
+        typer.Argument(help="Folders of kinertia fit, one per control; a cohort; or folders of such folders."),
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The file to write.")] = Path("norms.csv"),
+    quiet: Quiet = False,
+) -> Outcome:
+    """Make your laboratory's normative bands from the fits of people without pathology.
+
+    Mean and SD between people at every percent of the gait cycle; each person
+    counts once. kinertia report draws the bands and adds the Gait Profile Score.
+
+    [bold]Examples[/]
+
+    kinertia norms controls/anna controls/ben controls/cleo -o norms.csv
+
+    kinertia report out --norms norms.csv
+    """
+    own_file(output, read_norms, "kinertia norms")
+    people: dict[str, Control] = {}
+    seen: set[str] = set()
+    folders = results_of_people(results)
+    with shown_progress() as progress:
+        for k, found in enumerate(folders):
+            progress("reading", k / len(folders))
+            saved = read_saved(found.folder)
+            fit, name = saved.fit, found.name or _name(saved.fit, found.folder)
+            files = set() if saved.provenance is None else set(saved.provenance.files.values())
+            if name in people or files & seen:
+                raise FileError(found.folder, f"is a second fit of {name}: give one folder per person")
+            seen |= files
+            try:
+                people[name] = Control.of(fit)
+            except KinertiaError as error:
+                out.print(f"left out: {error}", soft_wrap=True)
+    columns = band_columns(list(people.values()))
+    write_then_rename(output, _csv(columns))
+    if mixed := mixture(list(people.values())):
+        out.print(f"note: {mixed}", soft_wrap=True)
+    spans = {name: columns[name][0] for name in columns if name.endswith(("_min", "_max"))}
+    out.print(f"norms of {len(people)} people{_spans_text(spans)} in {output}", soft_wrap=True)
+    summary = {"file": str(output), "people": sorted(people), "convention": columns["convention"][0], "note": mixed}
+    return Outcome({**summary, **spans})
+
+
+def _name(fit: Fit, folder: Path) -> str:
+    """Return the person's name, or the folder's name if the fit is only named after its trial."""
+    return folder.resolve().name if fit.subject.name in {trial.name for trial in fit.trials} else fit.subject.name
+
+
+def _spans_text(spans: dict[str, float | None]) -> str:
+    words = []
+    for name, unit in (("age_years", "years"), ("speed_m_s", "m/s")):
+        low, high = spans[f"{name}_min"], spans[f"{name}_max"]
+        if low is not None and high is not None:
+            words.append(f"{low:g} {unit}" if low == high else f"{low:g} to {high:g} {unit}")
+    return f" ({', '.join(words)})" if words else ""
+
+
+def _csv(columns: dict[str, list[object]]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    for row in zip(*columns.values(), strict=True):
+        writer.writerow(
+            ["" if cell is None else f"{cell:.6g}" if isinstance(cell, float) else inert(cell) for cell in row]
+        )
+    return text.getvalue()

@@ -6,14 +6,13 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from kinertia.cli.options import Quiet
-from kinertia.cli.outcome import Outcome
+from kinertia.cli.options import Outcome, Quiet
 from kinertia.cli.terminal import out
 from kinertia.errors import FileError
-from kinertia.estimation.cycles import columns_of
-from kinertia.estimation.gait_profile import check_convention, gait_profile
-from kinertia.estimation.gait_scores import with_norms
-from kinertia.estimation.result import Fit
+from kinertia.estimation.result.cycles import columns_of
+from kinertia.estimation.result.fit import Fit
+from kinertia.estimation.result.gait_profile import check_convention, gait_profile
+from kinertia.estimation.result.gait_scores import with_norms
 from kinertia.io.norms_file import Norm, read_norms
 from kinertia.io.results.output_folder import updated_files
 from kinertia.motion.model_outputs import CLINICAL_ANGLES

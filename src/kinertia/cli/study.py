@@ -7,8 +7,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from kinertia.cli.options import Output, Overwrite, Quiet, results_folder
-from kinertia.cli.outcome import Outcome, add_command
+from kinertia.cli.options import Outcome, Output, Overwrite, Quiet, add_command, results_folder
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.io.subject.reader import read_subject
 from kinertia.report.figures.journal_figure import HOW, has_matplotlib

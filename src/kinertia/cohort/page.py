@@ -15,7 +15,7 @@ import numpy as np
 from kinertia.cohort.instruments import COLUMNS, drift
 from kinertia.cohort.record import AGAINST
 from kinertia.diagnostics.limits import with_limits
-from kinertia.estimation.cycles import UNITS, Kind
+from kinertia.estimation.result.cycles import UNITS, Kind
 from kinertia.io.results.output_folder import write_then_rename
 from kinertia.model.bsp import PARAMETERS
 from kinertia.motion.gait_cycle import PERCENT

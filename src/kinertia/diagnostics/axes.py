@@ -5,7 +5,7 @@ from typing import Self, TypedDict
 
 import numpy as np
 
-from kinertia.io.lab_axes import ground_rotation
+from kinertia.io.lab_plates import ground_rotation
 from kinertia.trial.marker_quality import Travel
 
 _FORE_AFT, _MEDIOLATERAL = "fore-aft", "mediolateral"

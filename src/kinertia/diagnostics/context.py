@@ -41,7 +41,7 @@ from kinertia.trial.data import FEET, FloatArray, Markers, PlateLoads, Recording
 from kinertia.trial.ground_contact import FootMarkers
 from kinertia.trial.marker_quality import Travel, travel
 from kinertia.trial.plate_assignment import build_trial
-from kinertia.trial.sampled_time import within
+from kinertia.trial.sampled_data import within
 from kinertia.trial.trial_input import Task
 
 _STRAIGHT = 0.87

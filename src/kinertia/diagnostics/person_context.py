@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.estimation.total_mass import TotalMass
+from kinertia.estimation.prepare.prepared import TotalMass
 from kinertia.findings.finding import Finding, Severity
 from kinertia.model.imported_model import OsimModel
 from kinertia.model.marker_set import MarkerSet

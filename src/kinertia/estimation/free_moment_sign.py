@@ -20,17 +20,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinertia.estimation.prepared import Prepared
+from kinertia.estimation.prepare.prepared import Prepared
 from kinertia.estimation.simultaneous.calibration_entry import POSITION, CalibrationEntry
 from kinertia.estimation.simultaneous.fit import SimultaneousFit, held_against
 from kinertia.estimation.simultaneous.instruments.instrument_errors import OTHER_SIGN
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
 from kinertia.estimation.simultaneous.mixture_prior import FaultMixture
-from kinertia.estimation.simultaneous.uncertainty.model_evidence import FreeMomentSign
+from kinertia.estimation.simultaneous.uncertainty.evidence import FreeMomentSign
 from kinertia.motion.dynamics import residual
 from kinertia.motion.kinematics import Kinematics
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, free_moment, with_turned_free_moments
-from kinertia.trial.rms import rms
+from kinertia.trial.sampled_data import rms
 
 _LARGE = 0.5
 """Share of the residual below which twice the free moments are too small for the measured motion to judge."""

@@ -26,7 +26,7 @@ from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, consistent_root_acceleration, residual, root_derivatives, root_regressor
 from kinertia.motion.workload import one_blas_thread
-from kinertia.trial.sampled_time import span_s
+from kinertia.trial.sampled_data import span_s
 
 LONGEST_INTERVAL_S = 1.1
 """Longest integration interval, over which the pelvis is corrected by one double integration."""

@@ -11,7 +11,7 @@ from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.ground_forces import read_forces
-from kinertia.io.lab_axes import upright_along_z
+from kinertia.io.lab_plates import upright_along_z
 from kinertia.io.text.number_table import expect_file, wrong_kind
 from kinertia.io.text.trc import read_trc_recording
 from kinertia.model.alignment_device import with_knees_of_device

@@ -9,8 +9,8 @@ import numpy as np
 
 from kinertia.errors import OsimError
 from kinertia.model.anatomy import segment_of
-from kinertia.model.axis_functions import AxisFunction
 from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.coordinate_map import AxisFunction
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Skeleton
 from kinertia.trial.data import Markers

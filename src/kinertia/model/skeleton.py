@@ -18,9 +18,8 @@ from typing import Literal, Self
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kinertia.model.axis_functions import AxisFunction
 from kinertia.model.bsp import BodySegmentParameters, transformed_parameters
-from kinertia.model.coordinate_map import CoordinateMap, Root
+from kinertia.model.coordinate_map import AxisFunction, CoordinateMap, Root
 from kinertia.model.coordinate_range import ANYTHING, Bounds, Range
 from kinertia.model.kinematic_tree import KinematicTree, poses
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from kinertia.motion.smoothing import smooth
 from kinertia.trial.data import Trial
-from kinertia.trial.sampled_time import span_s, within
+from kinertia.trial.sampled_data import span_s, within
 
 LOWEST_HZ = 3.0
 ENDS_HZ = (6.0, 8.0, 10.0, 12.0, 15.0)

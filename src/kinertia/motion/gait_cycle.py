@@ -22,10 +22,9 @@ from kinertia.motion.moving_windows import gaussian_mean
 from kinertia.motion.workload import pieces
 from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, Trial
 from kinertia.trial.file_contents import GaitEvent, nearest_event
-from kinertia.trial.gait_events import gait_events, load_edges, usable_events
 from kinertia.trial.ground_contact import CONTACT_SLACK_S, bridged
-from kinertia.trial.leg_coverage import stances_of
-from kinertia.trial.sampled_time import TIME_TOLERANCE_S, runs, within
+from kinertia.trial.sampled_data import TIME_TOLERANCE_S, runs, within
+from kinertia.trial.stances import gait_events, load_edges, stances_of, usable_events
 
 PERCENT = np.arange(101.0)
 """Percentages of the gait cycle at which curves are given."""

@@ -26,8 +26,7 @@ from kinertia.motion.workload import pieces
 from kinertia.settings import ForceCutoff
 from kinertia.trial.centre_of_pressure import held_centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N
-from kinertia.trial.rms import rms_length
-from kinertia.trial.sampled_time import nearest_samples
+from kinertia.trial.sampled_data import nearest_samples, rms_length
 
 IMPACT_SHARE_OF_WEIGHT = 0.01
 """Forces faster than the motion that stay below this (RMS over about one period, share of the mean vertical force) are

@@ -20,12 +20,11 @@ from scipy.interpolate import PchipInterpolator
 
 from kinertia.errors import MarkerSetError, TrialError
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion.angle_continuity import EquivalentAngles
 from kinertia.motion.marker_sums import variances
-from kinertia.motion.pose_fit import PoseFit, Stop, fit_poses
+from kinertia.motion.pose_fit import EquivalentAngles, PoseFit, Stop, fit_poses
 from kinertia.motion.workload import one_blas_thread, pieces
 from kinertia.trial.data import Markers
-from kinertia.trial.rms import rms
+from kinertia.trial.sampled_data import rms
 
 _WARM_START_EVERY_S = 0.1
 _FAR_RAD_S, _FAR_RAD = 10.0, 0.2

@@ -26,7 +26,7 @@ from kinertia.motion.smoothing import SmoothedSpline, SmoothingError, smooth
 from kinertia.motion.workload import one_blas_thread
 from kinertia.trial.data import LOAD_THRESHOLD_N, Markers, Trial
 from kinertia.trial.foot_motion import AROUND_LOAD_S
-from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples, runs, span_s, within
+from kinertia.trial.sampled_data import TIME_TOLERANCE_S, nearest_samples, runs, span_s, within
 
 LONGEST_BRIDGE_S = 0.1
 """The spline may bridge a coordinate that the visible markers do not determine for at most this long."""

@@ -14,8 +14,7 @@ so that the motion S in the second frame causes, in the first, the generalised f
 import numpy as np
 
 from kinertia.model.compiled import Float1, Float2, Float3, Int1, compiled, inlined, part
-from kinertia.model.kinematic_tree import KinematicTree, hand_down, place_axes
-from kinertia.model.spatial import inner
+from kinertia.model.kinematic_tree import KinematicTree, hand_down, inner, place_axes
 
 
 @inlined

@@ -25,8 +25,7 @@ from scipy.spatial.transform import Rotation
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Pose, Skeleton
 from kinertia.motion.dynamics import Motion
-from kinertia.motion.joint_moments import component_signs, joint_axes
-from kinertia.motion.joint_wrench import BodyJoint, axes_alike, joint_wrenches, leg_joints
+from kinertia.motion.joint_moments import BodyJoint, axes_alike, component_signs, joint_axes, joint_wrenches, leg_joints
 from kinertia.trial.data import FEET
 
 Convention = Literal["plug-in-gait", "isb"]

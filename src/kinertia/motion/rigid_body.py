@@ -26,8 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.model.compiled import Bool1, Float2, compiled, inlined, part
-from kinertia.model.kinematic_tree import KinematicTree, hand_down, place_axes
-from kinertia.model.spatial import force_cross, inner, motion_cross
+from kinertia.model.kinematic_tree import KinematicTree, force_cross, hand_down, inner, motion_cross, place_axes
 
 
 class Frame(NamedTuple):

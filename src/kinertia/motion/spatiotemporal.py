@@ -7,8 +7,8 @@ from typing import Self
 import numpy as np
 
 from kinertia.motion.gait_cycle import FeetUnderPelvis, Stride
-from kinertia.trial.belt import Belt
 from kinertia.trial.data import FEET
+from kinertia.trial.file_contents import Belt
 
 _TOES_STAND = (0.3, 0.5)
 """Part of stance in which the toes are on the ground and not leaving it yet, in walking and running. The heel of a

@@ -10,9 +10,9 @@ from typing import Self
 
 import numpy as np
 
-from kinertia.motion.joint_wrench import BodyJoint
+from kinertia.motion.joint_moments import BodyJoint
 from kinertia.trial.file_contents import FileOutputs
-from kinertia.trial.sampled_time import nearest_samples
+from kinertia.trial.sampled_data import nearest_samples
 
 _SEGMENTS = {"Hip": "FE", "Knee": "TI", "Ankle": "FO"}
 """Vicon's name of the segment below each joint, in whose axes it gives the moment."""

@@ -1,8 +1,8 @@
 """Registers with `kinertia.trial.display` how trials and fits are shown and saved; loaded at the first use."""
 
-from kinertia.estimation.gait_profile import gait_profile
-from kinertia.estimation.result import Fit
-from kinertia.estimation.trial_fit import TrialFit
+from kinertia.estimation.result.fit import Fit
+from kinertia.estimation.result.gait_profile import gait_profile
+from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.findings.finding import Severity
 from kinertia.io.norms_file import read_norms
 from kinertia.report.exports.datasets import curve_dataset, draw_dataset
@@ -15,7 +15,7 @@ from kinertia.report.pages.rendering import rendered
 from kinertia.report.wording import start_of
 from kinertia.trial import display
 from kinertia.trial.data import LOAD_THRESHOLD_N, Markers, Recording, Trial
-from kinertia.trial.rms import rms
+from kinertia.trial.sampled_data import rms
 
 
 def fit_html(fit: Fit) -> str:

@@ -12,15 +12,15 @@ from typing import Literal
 
 from kinertia.errors import KinertiaError
 from kinertia.estimation.free_moment_sign import with_likelier_sign
-from kinertia.estimation.prepared import Prepared, Progress
+from kinertia.estimation.prepare.prepared import Prepared, Progress
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.fit import SimultaneousFit, fit_simultaneous
-from kinertia.estimation.simultaneous.linear_algebra.bandwidth import Bandwidth
+from kinertia.estimation.simultaneous.linear_algebra.motion_basis import Bandwidth
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import residual
 from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.workload import one_blas_thread
-from kinertia.trial.rms import rms_length
+from kinertia.trial.sampled_data import rms_length
 
 _FROZEN = 1e-3
 """Standard deviation of fixed parameters, as a share of the prior's."""

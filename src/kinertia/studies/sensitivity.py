@@ -17,18 +17,16 @@ from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.simultaneous.fit import calibration_prior
 from kinertia.estimation.simultaneous.instruments.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
-from kinertia.estimation.simultaneous.linear_algebra.bandwidth import Bandwidth
+from kinertia.estimation.simultaneous.linear_algebra.motion_basis import Bandwidth
 from kinertia.estimation.simultaneous.mixture_prior import FaultMixture
-from kinertia.estimation.simultaneous.observation import Observations, observe
-from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior
+from kinertia.estimation.simultaneous.observation import CalibrationPrior, Observations, observe
 from kinertia.estimation.simultaneous.outcome import SimultaneousResult
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.model.bsp import PARAMETERS
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import Kinematics
 from kinertia.studies.parallel import in_parallel
-from kinertia.synthetic.faults import Faults, measured
-from kinertia.synthetic.motions import MOTIONS
+from kinertia.synthetic.motions import MOTIONS, Faults, measured
 from kinertia.synthetic.walk import SyntheticSubject, SyntheticTrial, walk, walking_subject
 
 AMPLITUDES = (0.25, 0.5, 1.0, 2.0)

@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from kinertia.estimation.prepared import Progress
+from kinertia.estimation.prepare.prepared import Progress
 from kinertia.estimation.study_parameters import ParameterVector
 from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level
 from kinertia.io.subject.person_recordings import read_inputs
@@ -24,10 +24,10 @@ from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.motion.smoothing import SmoothedSpline, smooth
 from kinertia.motion.workload import one_blas_thread
 from kinertia.studies.parallel import in_parallel
-from kinertia.synthetic.noise import study_noise
+from kinertia.synthetic.laboratory import study_noise
 from kinertia.synthetic.walk import Manner, SyntheticTrial, consistent_trial, walk, walking_subject, without_products
 from kinertia.trial.data import Markers
-from kinertia.trial.rms import rms
+from kinertia.trial.sampled_data import rms
 from kinertia.workflow.prepare import prepare
 
 CONDITIONS = {

@@ -35,10 +35,10 @@ from kinertia.studies.table1 import (
     run_draw,
     study_trial,
 )
-from kinertia.synthetic.noise import STUDY_RATE_RAD_S, displaced
+from kinertia.synthetic.laboratory import STUDY_RATE_RAD_S, displaced
 from kinertia.synthetic.walk import HEIGHT_M, SyntheticTrial
 from kinertia.trial.data import Markers
-from kinertia.trial.rms import rms
+from kinertia.trial.sampled_data import rms
 
 NOISY = ("no_correction_noise", "correction_noise")
 CLASSES = {

@@ -21,12 +21,10 @@ from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.trial import display
-from kinertia.trial.belt import Belt
-from kinertia.trial.file_contents import FileEvent, FileOutputs, StatedContact, TorqueColumns
-from kinertia.trial.force_spikes import ForceSpike
+from kinertia.trial.file_contents import Belt, FileEvent, FileOutputs, StatedContact, TorqueColumns
 from kinertia.trial.impossible_data import impossible_markers, impossible_plates
-from kinertia.trial.sampled_time import nearest_samples, windows, within
-from kinertia.trial.unloaded_level import UnloadedReading
+from kinertia.trial.plate_signals import ForceSpike, UnloadedReading
+from kinertia.trial.sampled_data import nearest_samples, windows, within
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]

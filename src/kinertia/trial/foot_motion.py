@@ -9,9 +9,9 @@ from kinertia.errors import MarkerSetError, problem_of
 from kinertia.findings.finding import finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.trial.belt import Belt
 from kinertia.trial.data import BoolArray, FloatArray, Markers
-from kinertia.trial.sampled_time import runs, span_s, within
+from kinertia.trial.file_contents import Belt
+from kinertia.trial.sampled_data import runs, span_s, within
 
 AROUND_LOAD_S = 0.25
 """Frames so long before the first and after the last load help to interpret frames under load."""

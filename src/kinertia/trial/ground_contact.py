@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from kinertia.trial.belt import Belt
 from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, BoolArray, FloatArray, FootLoads, Markers
+from kinertia.trial.file_contents import Belt
 from kinertia.trial.foot_motion import FootMotion, foot_motions
-from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples, runs, span_s, within
+from kinertia.trial.sampled_data import TIME_TOLERANCE_S, nearest_samples, runs, span_s, within
 
 BRIDGED_GAP_S = 0.02
 """Gaps in a load shorter than this are bridged: it counts as one contact."""

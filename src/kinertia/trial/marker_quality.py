@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.trial.data import BoolArray, FloatArray, Markers
-from kinertia.trial.sampled_time import runs
+from kinertia.trial.sampled_data import runs
 
 STANDING_RANGE_M = 0.03
 """In a standing trial the median marker stays within this (5th to 95th percentile)."""

@@ -19,7 +19,7 @@ from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.trial.data import FEET, BoolArray, FloatArray, FootLoads, Markers, Recording, Trial
 from kinertia.trial.ground_contact import FootMarkers, GroundContact, bridged, ground_contact
-from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples, runs, span_s, windows, within
+from kinertia.trial.sampled_data import TIME_TOLERANCE_S, nearest_samples, runs, span_s, windows, within
 
 SHORTEST_CONTACT_S = 0.05
 """A load within the recording that lasts less than this is noise of an unloaded plate."""

@@ -17,9 +17,8 @@ import numpy.typing as npt
 
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray, PlateLoads
-from kinertia.trial.force_spikes import ForceSpike
-from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples, runs, span_s
-from kinertia.trial.unloaded_level import UnloadedReading
+from kinertia.trial.plate_signals import ForceSpike, UnloadedReading
+from kinertia.trial.sampled_data import TIME_TOLERANCE_S, nearest_samples, runs, span_s
 
 LONGEST_TAIL_S = 0.03
 """Longest low-force phase of a landing or leaving foot; what lasts longer below the threshold is an offset."""

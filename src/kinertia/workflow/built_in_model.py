@@ -7,7 +7,7 @@ from kinertia.diagnostics.labels.swapped_markers import labels_by_model
 from kinertia.diagnostics.runner import blocking
 from kinertia.diagnostics.subject.body_data import unobserved_segments
 from kinertia.errors import BlockedError, MarkerSetError, SettingsError, TrialError
-from kinertia.estimation.calibration import (
+from kinertia.estimation.prepare.calibration import (
     Adaptation,
     AdaptationInputs,
     adapt,
@@ -16,23 +16,23 @@ from kinertia.estimation.calibration import (
     turn_about,
     without_partly_shown,
 )
-from kinertia.estimation.input_checks import complete_subject, known
-from kinertia.estimation.joint_adaptation import (
+from kinertia.estimation.prepare.model_adaptation import (
     elbow_rotations,
     show_knee_axes,
+    shows_trunk,
     with_elbows_that_bend_forwards,
     with_rotating_arms,
+    with_upright_trunk,
 )
-from kinertia.estimation.population import population_prior
-from kinertia.estimation.prior import literature_prior
-from kinertia.estimation.simultaneous.instruments.model_uncertainty import (
+from kinertia.estimation.prepare.prepared import TotalMass, complete_subject, known
+from kinertia.estimation.prior import literature_prior, population_prior
+from kinertia.estimation.simultaneous.instruments.priors import (
     GAIT27_UNCERTAINTY,
     JOINT_AXIS_SD_RAD,
     MARKER_SD_M,
     WITHOUT_STATIC,
     ModelUncertainty,
 )
-from kinertia.estimation.total_mass import TotalMass
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
@@ -51,15 +51,18 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.model.upper_body import ARM_SEGMENTS, without_head
 from kinertia.motion.kinematics import facing
 from kinertia.motion.stance_pose import hidden_landmarks, stance_pose
-from kinertia.motion.upright_trunk import shows_trunk, with_upright_trunk
 from kinertia.motion.workload import one_blas_thread
 from kinertia.settings import Settings
 from kinertia.trial.data import Recording, Trial
-from kinertia.workflow.joint_widths import with_widths
-from kinertia.workflow.kinematics import RotatedTrial
 from kinertia.workflow.person import Person
-from kinertia.workflow.person_model import LOWER_BODY_SD_M, UPPER_BODY_SD_M, PersonModel, with_stated_ranges
-from kinertia.workflow.screening import Screened
+from kinertia.workflow.person_model import (
+    LOWER_BODY_SD_M,
+    UPPER_BODY_SD_M,
+    PersonModel,
+    RotatedTrial,
+    with_stated_ranges,
+)
+from kinertia.workflow.screening import Screened, with_widths
 
 _STAYS_M = 1e-4
 """SD (m) of markers that have been adapted already."""

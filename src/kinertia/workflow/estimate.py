@@ -11,16 +11,15 @@ from kinertia.diagnostics.result.registry import ESTIMATE_CHECKS, RESULT_CHECKS,
 from kinertia.diagnostics.runner import explained, overruled, rules_of
 from kinertia.errors import SettingsError
 from kinertia.estimation.free_moment_sign import Signed, with_likelier_sign
-from kinertia.estimation.joint_curves import JointCurves
-from kinertia.estimation.prepared import Prepared, Progress
+from kinertia.estimation.prepare.prepared import Prepared, Progress
 from kinertia.estimation.prior import BspPrior
-from kinertia.estimation.result import Fit
+from kinertia.estimation.result.fit import Fit
+from kinertia.estimation.result.trial_fit import JointCurves, TrialFit
 from kinertia.estimation.simultaneous.calibration_entry import GAIN
 from kinertia.estimation.simultaneous.fit import Posterior, SimultaneousFit, fit_simultaneous
-from kinertia.estimation.simultaneous.instruments.model_uncertainty import ModelUncertainty
-from kinertia.estimation.simultaneous.linear_algebra.bandwidth import Bandwidth
+from kinertia.estimation.simultaneous.instruments.priors import ModelUncertainty
+from kinertia.estimation.simultaneous.linear_algebra.motion_basis import Bandwidth
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
-from kinertia.estimation.trial_fit import TrialFit
 from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level, intervals
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.gait27 import VIRTUAL_TRUNK
@@ -35,8 +34,7 @@ from kinertia.motion.workload import one_blas_thread
 from kinertia.settings import Attached, Overrule, Settings, Subject
 from kinertia.trial.data import Recording
 from kinertia.trial.trial_input import TrialInput
-from kinertia.workflow.attached import with_attached
-from kinertia.workflow.doubted_mass import at_mass_of_plates
+from kinertia.workflow.masses import at_mass_of_plates, with_attached
 from kinertia.workflow.prepare import prepare
 
 _BEYOND_EDGE = "P282"

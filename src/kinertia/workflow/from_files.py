@@ -11,24 +11,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinertia.errors import PriorError, SessionError, SettingsError
-from kinertia.estimation.prepared import Prepared, Progress
-from kinertia.estimation.result import Fit
+from kinertia.estimation.prepare.prepared import Prepared, Progress
+from kinertia.estimation.result.fit import Fit
 from kinertia.findings.finding import finding
 from kinertia.findings.quantity import Quantity
 from kinertia.io.subject.provenance import command_line, recordings
 from kinertia.io.subject.reader import read_subject
 from kinertia.io.subject.tables import InstrumentsFiles, PriorFiles, SubjectFile
 from kinertia.settings import Overrule
-from kinertia.workflow.attached import with_attached
 from kinertia.workflow.estimate import estimate
+from kinertia.workflow.masses import with_attached
 from kinertia.workflow.person import read_person
 from kinertia.workflow.prepare import prepared
 from kinertia.workflow.screening import screen
 
 if TYPE_CHECKING:
     from kinertia.estimation.learnt_prior import LearntPrior
-    from kinertia.io.subject.measures_file import BodyMeasures
-    from kinertia.io.subject.session_file import PersonInstruments
+    from kinertia.io.subject.body_files import BodyMeasures
+    from kinertia.io.subject.learnt_files import PersonInstruments
 
 
 def prepare_subject(
@@ -75,7 +75,7 @@ def _session(wanted: SubjectFile) -> tuple[PersonInstruments, ...]:
     """Return the other people of the session, whose plates this person shares, with their instrument information."""
     if wanted.instruments.session is None:
         return ()
-    from kinertia.io.subject.session_file import read_session
+    from kinertia.io.subject.learnt_files import read_session
 
     session = read_session(wanted.instruments.session)
     if session:
@@ -87,7 +87,7 @@ def _measures(wanted: SubjectFile) -> BodyMeasures | None:
     """Read the sheet of girths and lengths, before anything is computed."""
     if wanted.prior.measures is None:
         return None
-    from kinertia.io.subject.measures_file import read_measures
+    from kinertia.io.subject.body_files import read_measures
     from kinertia.model.stadium_body import expect_yeadon
 
     expect_yeadon()
@@ -99,7 +99,7 @@ def _with_known_body(ready: Prepared, wanted: SubjectFile, measures: BodyMeasure
         return ready
     if wanted.settings.method == "two-level":
         return _with_unused(ready, "[prior] and [segment]")
-    from kinertia.io.subject.bsp_file import read_bsp
+    from kinertia.io.subject.body_files import read_bsp
     from kinertia.workflow.known_body import with_known_body
 
     earlier = None if wanted.prior.bsp is None else read_bsp(wanted.prior.bsp)
@@ -115,7 +115,7 @@ def _with_unused(ready: Prepared, entry: str) -> Prepared:
 def _group(wanted: SubjectFile, path: Path) -> LearntPrior:
     """Read the prior learnt from the person's group, unless this person was part of it."""
     from kinertia.estimation.learnt_prior import LearntPrior
-    from kinertia.io.subject.population_file import read_population
+    from kinertia.io.subject.learnt_files import read_population
 
     file = read_population(path)
     if set(recordings(wanted)) & set(file.files):

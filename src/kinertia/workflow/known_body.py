@@ -12,21 +12,19 @@ import numpy as np
 
 from kinertia.errors import PriorError
 from kinertia.estimation.body_measures import with_measures
-from kinertia.estimation.input_checks import known as known_value
 from kinertia.estimation.learnt_prior import LearntPrior
-from kinertia.estimation.prepared import Prepared
+from kinertia.estimation.prepare.prepared import Prepared, body_sd_kg
+from kinertia.estimation.prepare.prepared import known as known_value
 from kinertia.estimation.prior import BspPrior, literature_prior, updated, with_symmetry
-from kinertia.estimation.total_mass import body_sd_kg
 from kinertia.findings.display import shown
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.io.subject.bsp_file import BspTable
-from kinertia.io.subject.measures_file import BodyMeasures
+from kinertia.io.subject.body_files import BodyMeasures, BspTable
 from kinertia.model.bsp import PARAMETERS, UNITS, BodySegmentParameters
 from kinertia.model.stadium_body import measures as all_measures
 from kinertia.settings import Attached, KnownSegment, PriorSettings
-from kinertia.workflow.attached import with_attached
+from kinertia.workflow.masses import with_attached
 
 _UNLIKE_SD = 3.0
 """Distance from the tables, in SDs, beyond which the user is asked to check the value."""

@@ -10,17 +10,14 @@ from dataclasses import replace
 import numpy as np
 
 from kinertia.diagnostics.model.model_on_person import moved_markers
-from kinertia.estimation.calibration import AdaptationInputs, adapt, first_poses, lock_undetermined
-from kinertia.estimation.estimated_bodies import estimated_bodies
-from kinertia.estimation.input_checks import complete_subject, known
-from kinertia.estimation.population import population_prior
-from kinertia.estimation.prior import SCALE_SD, BspPrior, literature_prior
-from kinertia.estimation.simultaneous.instruments.model_uncertainty import (
+from kinertia.estimation.prepare.calibration import AdaptationInputs, adapt, first_poses, lock_undetermined
+from kinertia.estimation.prepare.prepared import TotalMass, complete_subject, estimated_bodies, known
+from kinertia.estimation.prior import SCALE_SD, BspPrior, literature_prior, population_prior
+from kinertia.estimation.simultaneous.instruments.priors import (
     JOINT_CENTRE_SD_M,
     MARKER_SD_M,
     ModelUncertainty,
 )
-from kinertia.estimation.total_mass import TotalMass
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
@@ -28,8 +25,13 @@ from kinertia.model.anatomy import segment_of
 from kinertia.model.bsp import BodySegmentParameters, impossible_segments
 from kinertia.model.imported_model import OsimModel
 from kinertia.model.skeleton import Axis, Skeleton
-from kinertia.workflow.kinematics import RotatedTrial
-from kinertia.workflow.person_model import LOWER_BODY_SD_M, UPPER_BODY_SD_M, PersonModel, with_stated_ranges
+from kinertia.workflow.person_model import (
+    LOWER_BODY_SD_M,
+    UPPER_BODY_SD_M,
+    PersonModel,
+    RotatedTrial,
+    with_stated_ranges,
+)
 from kinertia.workflow.screening import Screened
 
 _MASS_TOLERANCE = 0.002

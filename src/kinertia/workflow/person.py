@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Self, TypeVar
 
 from kinertia.errors import BlockedError, KinertiaError, MarkerSetError, SubjectError
-from kinertia.estimation.input_checks import complete_subject, lacking
+from kinertia.estimation.prepare.prepared import complete_subject, lacking
 from kinertia.findings.finding import Finding
 from kinertia.io.marker_set_file import marker_set_of, read_marker_set
 from kinertia.io.subject.person_recordings import read_static, read_trial

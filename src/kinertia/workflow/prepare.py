@@ -9,18 +9,16 @@ from collections.abc import Sequence
 
 from kinertia.diagnostics.subject.body_data import stated_ranges
 from kinertia.errors import SettingsError
-from kinertia.estimation.input_checks import check_trials
-from kinertia.estimation.prepared import Prepared, Progress
+from kinertia.estimation.prepare.prepared import Prepared, Progress, check_trials
 from kinertia.model.imported_model import OsimModel
 from kinertia.model.marker_set import MarkerSet
 from kinertia.motion.workload import one_blas_thread
 from kinertia.settings import Attached, Overrule, Settings, Subject
 from kinertia.trial.data import Recording
 from kinertia.trial.trial_input import TrialInput
-from kinertia.workflow.doubted_mass import with_doubted_mass
-from kinertia.workflow.kinematics import RotatedTrial, expect_forces, solved_trials, usable_trial
+from kinertia.workflow.masses import with_doubted_mass
 from kinertia.workflow.person import Person
-from kinertia.workflow.person_model import PersonModel
+from kinertia.workflow.person_model import PersonModel, RotatedTrial, expect_forces, solved_trials, usable_trial
 from kinertia.workflow.screening import Screened, screen
 
 

@@ -1,4 +1,4 @@
-"""Runs all checks before inverse kinematics, of all recordings of a person.
+"""Runs all checks before inverse kinematics, of all recordings of a person, after obvious corrections.
 
 `check` ends here and `fit` goes on from here, so that both run the same checks. A trial with an open ERROR is left
 out; one of the person, or of the static trial, stops everything.
@@ -9,7 +9,11 @@ from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from typing import Any
 
+import numpy as np
+
 from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.landmarks import feet_to_pelvis_m, landmark_positions
+from kinertia.diagnostics.markers.computed_markers import computed_points
 from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.plates.ground_contact import complete_contact
 from kinertia.diagnostics.registry import MOTION_CHECKS, PERSON_CHECKS, STATIC_CHECKS
@@ -23,21 +27,22 @@ from kinertia.diagnostics.runner import (
     rules_of,
 )
 from kinertia.errors import BlockedError, KinertiaError, MarkerSetError, SubjectError
-from kinertia.estimation.total_mass import TotalMass
-from kinertia.findings.finding import Finding
+from kinertia.estimation.prepare.prepared import TotalMass
+from kinertia.findings.finding import Finding, Severity, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+from kinertia.io.lab_plates import rotation_of_line
 from kinertia.model.alignment_device import with_alignment_device
+from kinertia.model.marker_set import WIDTHS, MarkerSet, matches_labels, spellings
 from kinertia.settings import Subject
 from kinertia.trial.data import Recording
-from kinertia.workflow.joint_widths import with_widths
 from kinertia.workflow.person import Person
-from kinertia.workflow.recording_corrections import (
-    with_model_spelling,
-    with_upright_static,
-    without_computed_points,
-)
 
 _OF_FORCES = ("P", "T211", "T212")
 """ERRORs that do not concern the markers."""
+_UPRIGHT = 0.9
+"""Cosine of 26 degrees between an axis and the line from feet to pelvis."""
+_SIDES = {"r": "right", "l": "left"}
 
 
 @cache
@@ -244,3 +249,101 @@ def _in_model(one: Finding, context: PersonContext) -> Finding:
     if context.model is None or one.where.trial is not None or not one.code.startswith("O"):
         return one
     return one.in_file(context.model.path.name)
+
+
+def with_upright_static(person: Person) -> Person:
+    """Return the person with the static trial rotated to Y up (F133) where another axis leads from feet to pelvis.
+
+    One with loads on plates is left as it is, since those would have to be rotated by their own axes.
+    """
+    static = person.static
+    if static is None or static.plates is not None or isinstance(person.labels, MarkerSetError):
+        return person
+    line = feet_to_pelvis_m(landmark_positions(static.markers, person.labels))
+    if line is None or np.abs(line).max() < _UPRIGHT * np.linalg.norm(line):
+        return person
+    rotation, axis = rotation_of_line(line)
+    if axis == "+Y":
+        return person
+    note = finding("F133", Where(trial=static.name), axis=Quantity(axis), source=Quantity("the feet and the pelvis"))
+    upright = replace(
+        static, markers=static.markers.rotated(rotation), vertical=axis, findings=(*static.findings, note)
+    )
+    return replace(person, static=upright)
+
+
+def with_model_spelling(person: Person) -> Person:
+    """Return the person, with trials labelled as the static trial or the model where only then the marker set fits them
+    (L103).
+    """
+    marker_set, static = person.labels, person.static
+    if isinstance(marker_set, MarkerSetError) or (static is None and person.model is None):
+        return person
+    known = marker_set.labels if static is None or person.model is not None else static.markers.labels
+    trials = [replace(one, recording=_spelled(one.recording, marker_set, known)) for one in person.trials]
+    return person if trials == [*person.trials] else replace(person, trials=trials)  # which would look for a set again
+
+
+def _spelled(recording: Recording, marker_set: MarkerSet, known: Sequence[str]) -> Recording:
+    labels = recording.markers.labels
+    if matches_labels(marker_set, labels):
+        return recording
+    read_as = {written: label for label, written in spellings(known, labels).items()}
+    alike = tuple(read_as.get(label, label) for label in labels)
+    if not matches_labels(marker_set, alike):
+        return recording
+    found = [
+        finding("L103", Where(markers=(written,)), written=Quantity(written), label=Quantity(label))
+        for written, label in read_as.items()
+        if label in marker_set.labels
+    ]
+    markers = replace(recording.markers, labels=alike)
+    return replace(recording, markers=markers, findings=(*recording.findings, *found))
+
+
+def with_widths(
+    static: Recording, trials: Sequence[Recording], marker_set: MarkerSet, subject: Subject
+) -> tuple[Recording, MarkerSet]:
+    """Return the static trial with all known widths and S105 for each from another file, and the set that includes
+    them.
+
+    The subject file takes precedence over the static trial, and that over the other trials.
+    """
+    names, widths_m, borrowed = dict(marker_set.widths), dict(static.measurements), []
+    for joint in WIDTHS:
+        key = f"{joint.rpartition('_')[0]}_width_mm"
+        given = getattr(subject, key)
+        if given is not None:
+            names[joint], widths_m[key] = key, given / 1e3
+            continue
+        name = names.get(joint)
+        if name is None or widths_m.get(name, 0.0) > 0.0:
+            continue
+        other = next((trial for trial in trials if trial.measurements.get(name, 0.0) > 0.0), None)
+        if other is not None:
+            widths_m[name] = other.measurements[name]
+            where = Where(file=other.name, part=f"{_SIDES[joint[-1]]} {joint.rpartition('_')[0]}")
+            borrowed.append(finding("S105", where, width_m=Quantity(widths_m[name], "m")))
+    found = (*static.findings, *borrowed)
+    return replace(static, measurements=widths_m, findings=found), replace(marker_set, widths=names)
+
+
+def without_computed_points(person: Person) -> Person:
+    """Return the person, with an OpenSim model, without markers that were calculated from others (M151).
+
+    They contain no measurement of their own, and the model's joint centres do not depend on them. Without a model they
+    may be what the laboratory places joints by: they stay.
+    """
+    if person.model is None or isinstance(person.labels, MarkerSetError):
+        return person
+    trials = [replace(one, recording=_measured_only(one.recording, person.labels)) for one in person.trials]
+    return person if trials == [*person.trials] else replace(person, trials=trials)
+
+
+def _measured_only(recording: Recording, marker_set: MarkerSet) -> Recording:
+    found = list(computed_points(recording, marker_set, Severity.CORRECTED))
+    computed = {label for one in found for label in one.where.markers}
+    if not computed:
+        return recording
+    measured = [label for label in recording.markers.labels if label not in computed]
+    return replace(recording, markers=recording.markers.select(measured), findings=(*recording.findings, *found))

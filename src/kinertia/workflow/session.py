@@ -7,8 +7,8 @@ import numpy as np
 
 from kinertia.diagnostics.result.session import session_contradictions
 from kinertia.errors import SessionError
-from kinertia.estimation.prepared import Prepared
-from kinertia.estimation.result import Fit
+from kinertia.estimation.prepare.prepared import Prepared
+from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry, item_text, quantity_text
 from kinertia.estimation.simultaneous.instruments.instrument_errors import laboratory_errors
 from kinertia.estimation.simultaneous.instruments.plates import PLATE_ERRORS, plates_with_floor
@@ -16,7 +16,7 @@ from kinertia.estimation.simultaneous.instruments.priors import InstrumentInform
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
-from kinertia.io.subject.session_file import PersonInstruments
+from kinertia.io.subject.learnt_files import PersonInstruments
 from kinertia.settings import Instruments
 
 

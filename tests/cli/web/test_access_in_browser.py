@@ -10,7 +10,7 @@ pytest.importorskip("uvicorn", reason="needs the extra app (pip install -e '.[te
 from app_tab import Tab, ready, with_everything
 from chromium import DESKTOP, PATIENCE_MS, PHONE, VIOLATIONS, picture, playwright
 from kinertia.cli.web import jobs
-from kinertia.io.subject.measures_file import measures_sheet
+from kinertia.io.subject.body_files import measures_sheet
 from kinertia.io.subject.reader import read_subject
 
 pytestmark = pytest.mark.slow

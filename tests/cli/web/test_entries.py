@@ -13,7 +13,7 @@ from kinertia.cli.web.file_table import file_table, uses_of, with_uses, within_f
 from kinertia.cli.web.library import Library
 from kinertia.errors import FileError, SettingsError
 from kinertia.io.marker_set_file import preset_names
-from kinertia.io.subject.measures_file import measures_sheet
+from kinertia.io.subject.body_files import measures_sheet
 from kinertia.io.subject.reader import read_subject
 from kinertia.settings import Subject
 

@@ -17,7 +17,7 @@ from kinertia.cli.web import routes
 from kinertia.cli.web.jobs import Jobs
 from kinertia.errors import internal_error
 from kinertia.io import samples
-from kinertia.io.subject.measures_file import measures_sheet
+from kinertia.io.subject.body_files import measures_sheet
 from kinertia.io.subject.reader import read_subject
 from kinertia.report.figures.measures_picture import measures_picture
 

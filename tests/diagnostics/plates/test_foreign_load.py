@@ -9,7 +9,7 @@ from kinertia.diagnostics.plates.gains import gains
 from kinertia.diagnostics.plates.ground_contact import foreign_load, stray_loads
 from kinertia.diagnostics.runner import explained
 from kinertia.findings.finding import Severity
-from kinertia.trial.sampled_time import runs, within
+from kinertia.trial.sampled_data import runs, within
 from loads_and_feet import context_of as feet_context_of
 from loads_and_feet import doubted
 from plate_findings import context_of

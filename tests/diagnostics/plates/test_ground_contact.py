@@ -10,7 +10,7 @@ from kinertia.diagnostics.plates.ground_contact import complete_contact, plate_e
 from kinertia.findings.finding import Severity
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.centre_of_pressure import centre_of_pressure
-from kinertia.trial.sampled_time import within
+from kinertia.trial.sampled_data import within
 from loads_and_feet import context_of, doubted, place_findings
 from recordings import here
 from walk_on_plates import FEET, walk

@@ -10,8 +10,8 @@ from kinertia.diagnostics.registry import SIGNAL_CHECKS, STANDING_CHECKS
 from kinertia.diagnostics.runner import asked, explained
 from kinertia.findings.finding import Severity
 from kinertia.trial.data import PlateLoads
-from kinertia.trial.force_spikes import without_spikes
 from kinertia.trial.plate_loading import with_unloaded_levels, without_unloaded_level
+from kinertia.trial.plate_signals import without_spikes
 from plate_findings import codes, plates_alone
 from recordings import LONG_WALKS, RUNS, SQUATS, WALKS, named_here
 

@@ -7,7 +7,7 @@ import pytest
 from kinertia.diagnostics.result.corrections import delays, zero_offsets
 from kinertia.diagnostics.result.plate_errors import free_moments, plate_positions
 from kinertia.diagnostics.runner import explained
-from kinertia.estimation.simultaneous.uncertainty.model_evidence import FreeMomentSign
+from kinertia.estimation.simultaneous.uncertainty.evidence import FreeMomentSign
 from kinertia.findings.finding import Severity
 from results import codes, context, error, walking
 

@@ -8,7 +8,7 @@ import pytest
 
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.masses import attached_items, forces_of_the_motion, total_mass
-from kinertia.estimation.total_mass import TotalMass
+from kinertia.estimation.prepare.prepared import TotalMass
 from kinertia.settings import Attached
 from kinertia.synthetic.walk import walking_subject
 

@@ -17,7 +17,7 @@ from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.settings import Attached
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.data import FootLoads, Trial
-from kinertia.trial.unloaded_level import UnloadedReading
+from kinertia.trial.plate_signals import UnloadedReading
 from people import codes, person
 from recordings import LONG_WALKS, RUNS, SQUATS, WALKS
 

@@ -12,7 +12,7 @@ from kinertia.findings.where import Where
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.data import FEET, FootLoads, Trial
 from kinertia.trial.file_contents import FileEvent
-from kinertia.trial.gait_events import load_edges
+from kinertia.trial.stances import load_edges
 
 FOOT_MARKERS = {
     side: [one.label for one in walking_subject().skeleton.markers if one.segment == f"foot_{side}"] for side in FEET

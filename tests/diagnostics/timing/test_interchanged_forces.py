@@ -9,7 +9,7 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.registry import TIMING_PERSON_CHECKS
 from kinertia.diagnostics.runner import asked, explained
 from kinertia.diagnostics.timing.interchanged_forces import interchanged_forces
-from kinertia.trial.sampled_time import within
+from kinertia.trial.sampled_data import within
 from trials_of_people import PEOPLE, Trials
 
 

@@ -8,7 +8,7 @@ import pytest
 from kinertia.diagnostics.evidence.plate_edges import Overhang
 from kinertia.diagnostics.timing.contact_delays import fitted_rate_or_delay
 from kinertia.diagnostics.timing.force_timing import force_rate
-from kinertia.trial.sampled_time import within
+from kinertia.trial.sampled_data import within
 from loads_and_feet import context_of
 from recordings import here
 from walk_on_plates import FEET, walk

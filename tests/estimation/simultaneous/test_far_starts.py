@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
-from kinertia.synthetic.noise import camera_noise
+from kinertia.synthetic.laboratory import camera_noise
 from recordings import slow_beside
 from validation.bsp_errors import errors
 from validation.study_noise import CAMERA_SD_M, drawn_start, held, observation_of, start_prior, study_noise, study_walk

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from kinertia.estimation.result import Fit
+from kinertia.estimation.result.fit import Fit
 from kinertia.report.exports.files import save_fit
 from kinertia.settings import Settings, Subject
 from kinertia.trial.trial_input import TrialInput

@@ -3,13 +3,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.estimation.simultaneous.linear_algebra.bandwidth import Bandwidth
+from kinertia.estimation.simultaneous.linear_algebra.motion_basis import Bandwidth
 from kinertia.estimation.simultaneous.markers.marker_noise import SMALLEST_MARKER_SD_M
-from kinertia.estimation.simultaneous.markers.shoulder_girdle import girdle_variance
+from kinertia.estimation.simultaneous.markers.skin import girdle_variance
 from kinertia.estimation.simultaneous.observation import FORCE_SD_OF_WEIGHT, MOMENT_ARM_M, observe
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.motion.kinematics import AROUND_WINDOW_S
-from kinertia.synthetic.noise import SkinMotion, camera_noise, study_noise
+from kinertia.synthetic.laboratory import SkinMotion, camera_noise, study_noise
 from validation.synthetic_walks import kinematics_of, study_walk
 
 MASS_KG = 72.6

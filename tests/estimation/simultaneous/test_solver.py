@@ -9,7 +9,7 @@ from kinertia.estimation.simultaneous.instruments.plates import FLOOR_UNKNOWNS
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
 from kinertia.estimation.simultaneous.linear_algebra.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.mixture_prior import FaultMixture
-from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
+from kinertia.estimation.simultaneous.observation import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.smoothing import smooth

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from kinertia.io.subject.bsp_file import read_bsp
+from kinertia.io.subject.body_files import read_bsp
 from kinertia.model.bsp import PARAMETERS, UNITS
 from refusals import refused
 

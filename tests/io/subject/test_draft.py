@@ -12,8 +12,8 @@ import pytest
 from generic_static import recording, standing_positions
 from kinertia.errors import FileError
 from kinertia.io.marker_set_file import read_marker_set
+from kinertia.io.subject.body_files import measures_sheet
 from kinertia.io.subject.draft import NOT_USED, init_files, init_subject
-from kinertia.io.subject.measures_file import measures_sheet
 from kinertia.io.subject.reader import read_subject
 from kinertia.io.text.trc import write_trc
 from kinertia.settings import Settings

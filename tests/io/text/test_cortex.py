@@ -3,7 +3,7 @@ import pytest
 
 from kinertia.errors import FileError
 from kinertia.findings.finding import Severity
-from kinertia.io.lab_axes import ground_rotation
+from kinertia.io.lab_plates import ground_rotation
 from kinertia.io.recording import read_recording
 from kinertia.io.subject.draft import has_force_columns
 from kinertia.io.text.cortex import read_cortex_forces

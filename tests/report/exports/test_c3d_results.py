@@ -9,9 +9,9 @@ import pytest
 import kinertia
 from command_line import fitted, run
 from kinertia.errors import FileError
-from kinertia.estimation.leg_outputs import outputs_of
+from kinertia.estimation.result.leg_outputs import outputs_of
 from kinertia.io.c3d.outputs import frames_of
-from kinertia.motion.joint_wrench import joint_wrenches
+from kinertia.motion.joint_moments import joint_wrenches
 from kinertia.motion.smoothing import smooth
 from kinertia.report.exports.c3d_results import c3d_with_results, prefix_of, to_file, usual_convention
 from kinertia.report.exports.saved_fit import load_fit

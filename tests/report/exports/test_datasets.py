@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.errors import KinertiaError, how_to_install
-from kinertia.estimation.drawn_fit import drawn_fit
+from kinertia.estimation.result.drawn_fit import drawn_fit
 
 xarray = pytest.importorskip("xarray")
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia import load_fit
-from kinertia.estimation.result import Fit
+from kinertia.estimation.result.fit import Fit
 from kinertia.report.figures import style
 from kinertia.report.figures.coordinate_titles import convention_of, panels_of, title_of
 from kinertia.report.figures.cycle_figures import cycle_figures

@@ -5,7 +5,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from command_line import run
-from kinertia.io.subject.measures_file import measures_sheet
+from kinertia.io.subject.body_files import measures_sheet
 from kinertia.model.stadium_body import measures
 from kinertia.report.figures.measures_picture import LEVELS, measures_picture
 

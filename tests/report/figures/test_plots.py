@@ -6,7 +6,7 @@ import plotly.graph_objects as go
 import pytest
 
 from kinertia.errors import KinertiaError
-from kinertia.estimation.figure_names import FitPictures
+from kinertia.estimation.result.figure_names import FitPictures
 from kinertia.report.figures.journal_figure import FOR_PAPERS
 from report_page import figures_of
 

@@ -7,8 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from kinertia import load_fit
-from kinertia.motion.joint_moments import component_signs
-from kinertia.motion.joint_wrench import joint_wrenches, leg_joints
+from kinertia.motion.joint_moments import component_signs, joint_wrenches, leg_joints
 from kinertia.report.pages.page import render
 from kinertia.report.pages.vicon_differences import COMPONENTS, curve_differences, differences_view
 from kinertia.trial.file_contents import FileOutputs

@@ -12,8 +12,8 @@ from typing import Any, get_args
 from kinertia.errors import SettingsError
 from kinertia.io.file_names import last_part
 from kinertia.io.marker_set_file import preset_names
+from kinertia.io.subject.body_files import is_measures_sheet
 from kinertia.io.subject.draft import STATIC_NAME, has_force_columns, holds_loads, is_capture
-from kinertia.io.subject.measures_file import is_measures_sheet
 from kinertia.io.subject.tables import TABLES
 from kinertia.io.text.qualisys import is_plate_file
 

@@ -1,4 +1,4 @@
-"""Manages the library: a folder with one folder per person, which the command line reads as well.
+"""Manages the library: a folder per person, which the command line reads as well, and files dropped on the page.
 
     Kinertia/
         Anna/
@@ -12,8 +12,9 @@ All that is known about a person is in the folder: there is no index that could 
 import json
 import os
 import shutil
+import tempfile
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -22,7 +23,8 @@ from typing import Any
 
 from kinertia.cohort.record import inputs_of
 from kinertia.errors import FileError, KinertiaError
-from kinertia.io.file_names import fits_everywhere, same_folder
+from kinertia.io.file_names import fits_everywhere, last_part, same_folder
+from kinertia.io.recording import FORCE_FILES, MARKER_FILES
 from kinertia.io.results.output_folder import check_folder, write_then_rename
 from kinertia.io.results.working_folder import sole_use, sweep
 from kinertia.io.subject.provenance import sha256
@@ -36,6 +38,12 @@ _STARTED, _INTERRUPTED = "started", "interrupted"
 _LONGEST_NAME = 80
 _NOTING = threading.Lock()
 """Check, fit and page note what they know of a person at the same time."""
+LARGEST_FILE_MB, LARGEST_PERSON_MB, MOST_FILES = 500, 2000, 200
+"""Limits of one file, of all files of a person, and of their number; pages state them."""
+ENDINGS = tuple(dict.fromkeys((*MARKER_FILES, *FORCE_FILES, ".xml", ".osim", ".toml")))
+LIMITS = {"file_mb": LARGEST_FILE_MB, "person_mb": LARGEST_PERSON_MB, "files": MOST_FILES, "endings": ENDINGS}
+"""Limits as stated on pages."""
+_LONGEST_NAME_BYTES, _LARGEST_TOML_MB = 150, 1
 
 
 @dataclass(frozen=True)
@@ -212,3 +220,57 @@ def _json(path: Path) -> dict[str, Any]:
     except (OSError, ValueError):
         return {}
     return content if isinstance(content, dict) else {}
+
+
+def harmless_name(given: str) -> str:
+    """Return the name of a file without the folders before it.
+
+    Raises:
+        FileError: it cannot be a file's name on every system, or is hidden, or Kinertia does not read its kind.
+    """
+    name = last_part(given)
+    shown = name[:_LONGEST_NAME_BYTES] or given[:_LONGEST_NAME] or "a file without a name"
+    sound = fits_everywhere(name) and name.isprintable() and len(name.encode()) <= _LONGEST_NAME_BYTES
+    if name.startswith(".") or not sound:
+        raise FileError(
+            shown,
+            "not accepted: a file's name must be valid on every system (none of < > : \" / \\ | ? *, no dot first or "
+            f"last, no device of Windows, at most {_LONGEST_NAME_BYTES} bytes); rename it",
+        )
+    suffix = Path(name).suffix.lower()
+    if suffix == ".zip":
+        raise FileError(name, "not accepted: archives are not unpacked here; unpack it and drop the folder")
+    if suffix not in ENDINGS:
+        kind = f"a '{suffix}' file" if suffix else "a file without an ending"
+        raise FileError(name, f"not accepted: {kind} is none that Kinertia reads; those are {', '.join(ENDINGS)}")
+    return name
+
+
+async def receive(person: PersonFolder, given: str, chunks: AsyncIterator[bytes]) -> Path:
+    """Write a dropped file to the person's folder, complete or not at all; one of the same name is replaced.
+
+    Raises:
+        FileError: the name or the size is not accepted.
+    """
+    name = harmless_name(given)
+    files = [path for path in person.files() if not same_folder(path.name, name)]
+    if len(files) >= MOST_FILES:
+        raise FileError(name, f"not accepted: {len(files)} files are here, the most of one person; remove some")
+    left = 1_000_000 * LARGEST_PERSON_MB - sum(path.stat().st_size for path in files)
+    text = name.lower().endswith(".toml")
+    largest_mb, what = (_LARGEST_TOML_MB, "a TOML file") if text else (LARGEST_FILE_MB, "one file")
+    handle, temporary = tempfile.mkstemp(dir=person.folder, prefix=".upload.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            async for chunk in chunks:
+                left -= len(chunk)
+                if file.tell() + len(chunk) > 1_000_000 * largest_mb:
+                    raise FileError(name, f"not accepted: larger than {largest_mb} MB, the most of {what}")
+                if left < 0:
+                    raise FileError(name, f"not accepted: all files of a person have {LARGEST_PERSON_MB} MB at most")
+                file.write(chunk)
+        os.replace(temporary, person.folder / name)
+    except BaseException:
+        os.unlink(temporary)
+        raise
+    return person.folder / name

@@ -13,10 +13,9 @@ from starlette.responses import HTMLResponse
 from kinertia.cli.web.entries import USE, entries, fields, label_of, marker_set_field, trouble
 from kinertia.cli.web.file_table import file_table
 from kinertia.cli.web.jobs import KINDS, Job, Jobs
-from kinertia.cli.web.library import PersonFolder
+from kinertia.cli.web.library import LIMITS, PersonFolder
 from kinertia.cli.web.responses import page, time_left
 from kinertia.cli.web.rows import rows as rows_of
-from kinertia.cli.web.uploads import LIMITS
 from kinertia.errors import KinertiaError
 from kinertia.model.marker_set import SEGMENTS
 from kinertia.report.pages.finding_view import LOOKS

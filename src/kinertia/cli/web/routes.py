@@ -15,17 +15,25 @@ from starlette.routing import BaseRoute, Mount, Route
 from starlette.staticfiles import StaticFiles
 
 from kinertia.cli.web.entries import recognise, trouble, write_form, write_text
-from kinertia.cli.web.guard import RESULT_POLICY
 from kinertia.cli.web.jobs import KINDS, Jobs
-from kinertia.cli.web.library import Library, PersonFolder
+from kinertia.cli.web.library import ENDINGS, LIMITS, Library, PersonFolder, receive
 from kinertia.cli.web.marker_page import marker_routes
 from kinertia.cli.web.person_page import person_page, progress, standing
-from kinertia.cli.web.responses import archive, chosen_folder, expect, form, page, result_file, time_left, to
-from kinertia.cli.web.uploads import ENDINGS, LIMITS, receive
+from kinertia.cli.web.responses import (
+    RESULT_POLICY,
+    archive,
+    chosen_folder,
+    expect,
+    form,
+    page,
+    result_file,
+    time_left,
+    to,
+)
 from kinertia.errors import KinertiaError, internal_error
 from kinertia.io.results.output_folder import complete_folder, expect_own_folder
 from kinertia.io.samples import SIZE_MB
-from kinertia.io.subject.measures_file import measures_sheet
+from kinertia.io.subject.body_files import measures_sheet
 from kinertia.report.figures.measures_picture import measures_picture
 
 Example = Callable[[Path], object]

@@ -11,9 +11,9 @@ from types import MappingProxyType
 
 import uvicorn
 
-from kinertia.cli.web.guard import Guard
 from kinertia.cli.web.jobs import Jobs
 from kinertia.cli.web.library import Library
+from kinertia.cli.web.responses import Guard
 from kinertia.cli.web.routes import Example, application
 from kinertia.errors import SettingsError
 

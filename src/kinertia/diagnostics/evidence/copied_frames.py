@@ -10,7 +10,7 @@ import numpy as np
 
 from kinertia.findings.limit import Limit
 from kinertia.trial.data import BoolArray, FloatArray, Markers
-from kinertia.trial.sampled_time import runs
+from kinertia.trial.sampled_data import runs
 
 COPIED_SHARE = Limit(0.25)
 """Share of copies beyond which the recording was upsampled: at half the rate, each repeated once, half are copies."""

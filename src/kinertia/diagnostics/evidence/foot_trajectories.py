@@ -7,10 +7,10 @@ from typing import Self
 import numpy as np
 
 from kinertia.diagnostics.evidence.body_centre import bridged_trajectory
-from kinertia.trial.belt import Belt
 from kinertia.trial.data import FEET, BoolArray, FloatArray, Markers
+from kinertia.trial.file_contents import Belt
 from kinertia.trial.ground_contact import bridged
-from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples, runs, span_s
+from kinertia.trial.sampled_data import TIME_TOLERANCE_S, nearest_samples, runs, span_s
 
 _LOW = 0.15
 """Share of the frames in which a foot is lowest: then it goes with the ground, or with a treadmill's belt."""

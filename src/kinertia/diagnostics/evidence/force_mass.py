@@ -23,7 +23,7 @@ from kinertia.trial.centre_of_pressure import FIRM_LOAD_N
 from kinertia.trial.data import FEET, FloatArray, FootLoads, Markers, PlateLoads, Trial
 from kinertia.trial.foot_motion import AROUND_LOAD_S
 from kinertia.trial.ground_contact import FootMarkers
-from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples, runs, span_s, within
+from kinertia.trial.sampled_data import TIME_TOLERANCE_S, nearest_samples, runs, span_s, within
 
 CHANGE_SD_M_S = {"standing": 0.01, "whole strides": 0.05, "steps": 0.05, "the whole window": 0.14}
 """Standard deviation of the change of vertical velocity by markers, between both ends: half of it is due to motion of

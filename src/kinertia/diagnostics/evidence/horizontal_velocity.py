@@ -12,7 +12,7 @@ from kinertia.motion.smoothing import SmoothingError, smooth
 from kinertia.trial.data import FloatArray, PlateLoads, Trial
 from kinertia.trial.foot_motion import AROUND_LOAD_S
 from kinertia.trial.marker_quality import Travel
-from kinertia.trial.sampled_time import span_s, within
+from kinertia.trial.sampled_data import span_s, within
 
 _PELVIS_HZ = 6.0
 LEAST_WINDOW_S, _LEAST_SPECIFIC = 0.4, 0.2

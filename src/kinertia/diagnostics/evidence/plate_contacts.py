@@ -11,7 +11,7 @@ from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
 from kinertia.trial.foot_motion import AROUND_LOAD_S
 from kinertia.trial.ground_contact import bridged
-from kinertia.trial.sampled_time import TIME_TOLERANCE_S, runs, span_s
+from kinertia.trial.sampled_data import TIME_TOLERANCE_S, runs, span_s
 
 COP_MIN_FORCE_N = 5 * LOAD_THRESHOLD_N
 CONTACT_FORCE_N, SHORTEST_S = 50.0, 0.15

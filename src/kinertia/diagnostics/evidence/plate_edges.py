@@ -8,7 +8,7 @@ import numpy as np
 from kinertia.diagnostics.evidence.plate_contacts import FAR_M, PlateContact
 from kinertia.findings.limit import Limit
 from kinertia.trial.data import BoolArray, FloatArray, Markers, PlateLoads
-from kinertia.trial.sampled_time import within
+from kinertia.trial.sampled_data import within
 
 OVERHANG_M, HALLUX_M = Limit(0.01, "m"), Limit(0.02, "m")
 """Distance of markers from the skin; and uncertainty of the position of a big toe without a marker."""

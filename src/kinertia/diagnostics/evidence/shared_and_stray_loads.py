@@ -13,7 +13,7 @@ from kinertia.findings.limit import Limit
 from kinertia.model.marker_set import MarkerSet
 from kinertia.motion.kinematics import FEWEST_FRAMES
 from kinertia.trial.data import FEET, BoolArray, PlateLoads, Trial
-from kinertia.trial.sampled_time import runs, span_s, within
+from kinertia.trial.sampled_data import runs, span_s, within
 
 OUTSIDE_M, _OUTSIDE_SHARE = Limit(0.14, "m"), 0.01
 _MOSTLY = 0.5

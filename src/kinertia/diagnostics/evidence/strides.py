@@ -8,7 +8,7 @@ import numpy as np
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory
 from kinertia.trial.data import FEET, FootLoads
 from kinertia.trial.ground_contact import bridged
-from kinertia.trial.sampled_time import TIME_TOLERANCE_S, runs, span_s
+from kinertia.trial.sampled_data import TIME_TOLERANCE_S, runs, span_s
 
 _TOGETHER = 0.2
 """Share of the time between two landings of a foot within which the other foot lands with it."""

@@ -14,7 +14,7 @@ import numpy as np
 from kinertia.diagnostics.evidence.marker_precision import USUAL_HZ
 from kinertia.findings.limit import Limit
 from kinertia.trial.data import BoolArray, FloatArray, Markers
-from kinertia.trial.sampled_time import runs
+from kinertia.trial.sampled_data import runs
 
 BODY_M = 0.02
 SPIKE_M = Limit(0.08, "m", usual=(0.0, BODY_M))

@@ -9,7 +9,6 @@ from kinertia.errors import KinertiaError, MarkerSetError
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
-from kinertia.model.assumptions import assumptions
 from kinertia.model.gait27 import build_gait27
 from kinertia.model.joint_centres import (
     WAND_LIMITS,
@@ -20,8 +19,8 @@ from kinertia.model.joint_centres import (
     pelvis_frame,
     wand_rotation,
 )
-from kinertia.model.leg_axes import ANKLE, FOOT, KNEE, departures
 from kinertia.model.marker_set import in_words, nearest_labels, with_nearest
+from kinertia.model.static_landmarks import ANKLE, FOOT, KNEE, assumptions, departures
 
 _USUAL_HEIGHT_M, _ANY_SEX = 1.7, "male"
 """Whether landmarks suffice depends on neither."""

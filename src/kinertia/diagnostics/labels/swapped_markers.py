@@ -13,7 +13,7 @@ from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.trajectory_faults import step_limit_m, steps
 from kinertia.diagnostics.runner import check
-from kinertia.estimation.calibration import sampled
+from kinertia.estimation.prepare.calibration import sampled
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity

@@ -16,7 +16,7 @@ from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import FloatArray
 from kinertia.trial.marker_quality import UPRIGHT_SHARE, extent_m
-from kinertia.trial.sampled_time import runs, span_s
+from kinertia.trial.sampled_data import runs, span_s
 
 _SMALLEST_M, _LARGEST_M = Limit(0.3, "m"), Limit(2.8, "m")
 _UPRIGHT = 0.5

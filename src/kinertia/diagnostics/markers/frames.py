@@ -24,7 +24,7 @@ from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import BoolArray, FloatArray, Markers
-from kinertia.trial.sampled_time import runs
+from kinertia.trial.sampled_data import runs
 
 _MISSING_M, _MISSING_TIMES = Limit(0.006, "m", usual=(0.0, 0.0015)), Limit(3.0)
 """Step of the median marker where frames are missing: at least this distance, and this multiple of its usual step.

@@ -26,7 +26,7 @@ from kinertia.model.marker_set import in_words
 from kinertia.motion.kinematics import LONGEST_BRIDGE_S
 from kinertia.trial.data import Markers
 from kinertia.trial.marker_quality import visibility
-from kinertia.trial.sampled_time import windows
+from kinertia.trial.sampled_data import windows
 
 _COINCIDING_M, _COINCIDING_S, _MOSTLY = Limit(0.003, "m"), Limit(0.1, "s"), 0.5
 """The centres of two markers are at least a diameter apart: 4 mm for the smallest."""

@@ -26,7 +26,7 @@ from kinertia.model.anatomy import segment_of
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Skeleton
 from kinertia.trial.data import FloatArray, Markers
-from kinertia.trial.rms import rms
+from kinertia.trial.sampled_data import rms
 
 _OTHER_SCALE, _OTHER_BODY = Limit(0.025, usual=(-0.011, 0.011)), Limit(0.05)
 """Median share by which distances may differ: beyond the one a fit warns, beyond the other it refuses."""

@@ -35,8 +35,7 @@ from kinertia.findings.quantity import Quantity
 from kinertia.findings.rule import rule
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, free_moment
 from kinertia.trial.data import PlateLoads, Trial
-from kinertia.trial.rms import rms
-from kinertia.trial.sampled_time import span_s
+from kinertia.trial.sampled_data import rms, span_s
 
 _OPPOSED = Limit(-0.4, usual=(0.5, 1.0))
 _CLEAR, _CLEAR_ROTATION, _ROTATED_DEG = 0.7, 0.35, 60.0

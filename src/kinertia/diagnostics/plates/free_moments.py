@@ -31,8 +31,7 @@ from kinertia.findings.rule import rule
 from kinertia.trial.centre_of_pressure import centre_of_pressure, free_moment
 from kinertia.trial.data import FloatArray, FootLoads, PlateLoads
 from kinertia.trial.file_contents import TorqueColumns
-from kinertia.trial.rms import rms
-from kinertia.trial.sampled_time import TIME_TOLERANCE_S, span_s, within
+from kinertia.trial.sampled_data import TIME_TOLERANCE_S, rms, span_s, within
 
 _ABSENT_NM = Limit(0.005, "N m")
 """Amplifiers have more noise than this. Feet twist against the ground by some N m."""

@@ -25,7 +25,7 @@ from kinertia.findings.finding import Finding, with_evidence
 from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import PlateLoads
-from kinertia.trial.sampled_time import span_s, within
+from kinertia.trial.sampled_data import span_s, within
 
 _DIFFERENCE = Limit(0.075, usual=(0.0, 0.02))
 _LEAST_WINDOW_S, _LEAST_GAIN, _RESIDUAL_SHARE = 1.0, Limit(0.025, usual=(0.0, 0.01)), 0.9

@@ -15,7 +15,7 @@ from kinertia.findings.quantity import Quantity
 from kinertia.motion.common_cutoff import LOWEST_HZ
 from kinertia.motion.kinematics import END_PERIODS, FEWEST_FRAMES, legs_on_plates
 from kinertia.trial.plate_assignment import FOOT_NAMES, SHORTEST_CONTACT_S, no_forces
-from kinertia.trial.sampled_time import within
+from kinertia.trial.sampled_data import within
 
 
 @check(

@@ -25,7 +25,7 @@ from kinertia.findings.finding import Finding, finding
 from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
-from kinertia.trial.rms import rms
+from kinertia.trial.sampled_data import rms
 
 WRONG_M, _RIGHT_M, _CLEARLY_BEST = Limit(0.1, "m", usual=(0.016, 0.075)), 0.08, 0.6
 _ORDER = "a wrong order of the corners"

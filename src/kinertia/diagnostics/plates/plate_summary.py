@@ -6,7 +6,7 @@ from kinertia.diagnostics.plates.cop_path import off_plate
 from kinertia.trial.data import FEET, BoolArray, FloatArray, Recording
 from kinertia.trial.ground_contact import FootMarkers, bridged
 from kinertia.trial.plate_assignment import SHORTEST_CONTACT_S, assign_plates
-from kinertia.trial.sampled_time import runs
+from kinertia.trial.sampled_data import runs
 
 _FOOT_NAMES = {"r": "right", "l": "left", None: "unknown foot"}
 _LISTED = 4

@@ -22,8 +22,8 @@ from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, centre_of_pressure
 from kinertia.trial.data import BoolArray, FloatArray, PlateLoads
-from kinertia.trial.force_spikes import LIMITS_N, LONGEST_S
-from kinertia.trial.sampled_time import runs, span_s
+from kinertia.trial.plate_signals import LIMITS_N, LONGEST_S
+from kinertia.trial.sampled_data import runs, span_s
 
 _DEAD_N, _DEAD_NM = Limit(0.5, "N"), Limit(0.5, "N m")
 """Amplifiers have more noise than this."""

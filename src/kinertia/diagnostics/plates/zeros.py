@@ -23,8 +23,8 @@ from kinertia.findings.rule import rule
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
-from kinertia.trial.sampled_time import span_s, within
-from kinertia.trial.unloaded_level import ZEROED_N, ZEROED_NM, UnloadedReading
+from kinertia.trial.plate_signals import ZEROED_N, ZEROED_NM, UnloadedReading
+from kinertia.trial.sampled_data import span_s, within
 
 _ZERO_N = Limit(15.0, "N", usual=(-3.0, 3.0))
 _FAR_FROM_ZERO_N, _DRIFT_N = Limit(40.0, "N"), Limit(15.0, "N")

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.suitability import GROUPS, SHOWN_SHARE, informed, prior_values
 from kinertia.diagnostics.runner import check
-from kinertia.estimation.forces_used import forces_used
+from kinertia.estimation.result.leg_moments import forces_used
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity

@@ -7,8 +7,8 @@ from functools import cached_property
 from kinertia.diagnostics.axes import Axes
 from kinertia.diagnostics.evidence.body_centre import owners_of
 from kinertia.diagnostics.evidence.force_mass import ForceMass, force_mass
-from kinertia.estimation.prepared import Prepared
-from kinertia.estimation.result import Fit
+from kinertia.estimation.prepare.prepared import Prepared
+from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
 from kinertia.findings.where import Where
 from kinertia.motion.kinematics import Kinematics

@@ -15,10 +15,10 @@ from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory, foot
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.corrections import equal, reported
 from kinertia.diagnostics.runner import check
-from kinertia.estimation.joint_adaptation import BACKWARDS_RAD
+from kinertia.estimation.prepare.model_adaptation import BACKWARDS_RAD
+from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.estimation.simultaneous.calibration_entry import AXIS, POSITION, CalibrationEntry
-from kinertia.estimation.simultaneous.instruments.model_uncertainty import JOINT_AXIS_SD_RAD
-from kinertia.estimation.trial_fit import TrialFit
+from kinertia.estimation.simultaneous.instruments.priors import JOINT_AXIS_SD_RAD
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
@@ -28,7 +28,7 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.model.upper_body import head_markers
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, centre_of_pressure
 from kinertia.trial.data import FEET
-from kinertia.trial.sampled_time import within
+from kinertia.trial.sampled_data import within
 
 _MOVED_M = Limit(0.03, "m")
 """Skin moves markers up to some 30 mm."""

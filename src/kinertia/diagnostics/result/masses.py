@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.runner import check
-from kinertia.estimation.input_checks import mass_by_force_kg
-from kinertia.estimation.trial_fit import TrialFit
+from kinertia.estimation.prepare.prepared import mass_by_force_kg
+from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity

@@ -36,6 +36,7 @@ from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.corrections import corrected, correction, equal, reported
 from kinertia.diagnostics.runner import check
 from kinertia.estimation.free_moment_sign import VERTICAL, residual_moments_nm, residual_moments_without_offsets_nm
+from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.estimation.simultaneous.calibration_entry import FREE_MOMENT, GAIN, POSITION, ROTATION, CalibrationEntry
 from kinertia.estimation.simultaneous.instruments.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS
 from kinertia.estimation.simultaneous.instruments.priors import (
@@ -45,8 +46,7 @@ from kinertia.estimation.simultaneous.instruments.priors import (
     InstrumentInformation,
     InstrumentPrior,
 )
-from kinertia.estimation.simultaneous.uncertainty.missing_load_evidence import SURE
-from kinertia.estimation.trial_fit import TrialFit
+from kinertia.estimation.simultaneous.uncertainty.evidence import SURE
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity

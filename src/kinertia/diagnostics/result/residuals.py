@@ -21,7 +21,7 @@ import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.runner import check
-from kinertia.estimation.trial_fit import TrialFit
+from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
@@ -29,7 +29,7 @@ from kinertia.findings.where import Where
 from kinertia.model.anatomy import segment_of
 from kinertia.model.coordinate_range import TOLERANCE_DEG, UNKNOWN
 from kinertia.model.neutral_joints import centre_offsets
-from kinertia.trial.rms import rms, rms_by_marker
+from kinertia.trial.sampled_data import rms, rms_by_marker
 
 _IMPOSSIBLE_RAD = Limit(np.radians(TOLERANCE_DEG), "rad")
 """Excess beyond the range of any person."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.runner import check
-from kinertia.estimation.result import Fit
+from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import UNLIKE_CHANCE, OneSided, Unlikeness
 from kinertia.findings.display import first_few
 from kinertia.findings.finding import Finding, Severity, finding

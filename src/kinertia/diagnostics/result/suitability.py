@@ -12,10 +12,10 @@ import numpy as np
 
 from kinertia.diagnostics.result.soundness import expected_source
 from kinertia.estimation.identifiability import INFORMED, MEASURED
-from kinertia.estimation.leg_moments import coverage_sentence
-from kinertia.estimation.result import Fit
+from kinertia.estimation.result.fit import Fit
+from kinertia.estimation.result.leg_moments import coverage_sentence
 from kinertia.findings.finding import Finding, Severity
-from kinertia.trial.rms import rms, rms_length
+from kinertia.trial.sampled_data import rms, rms_length
 
 Use = Literal["use", "use with care", "do not use"]
 _ORDER: tuple[Use, ...] = ("use", "use with care", "do not use")

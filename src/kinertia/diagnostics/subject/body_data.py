@@ -17,7 +17,7 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.runner import check
 from kinertia.diagnostics.subject.mass import weighed_as_stated
-from kinertia.estimation.population import population_of
+from kinertia.estimation.prior import population_of
 from kinertia.findings.display import first_few
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.limit import Limit

@@ -23,7 +23,7 @@ from kinertia.findings.finding import Finding, finding
 from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.trial.rms import rms
+from kinertia.trial.sampled_data import rms
 
 AGAINST_STANDING = Limit(-0.0045)
 """Usual share by which distances are longer in motion than in a standing trial."""

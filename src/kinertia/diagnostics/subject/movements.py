@@ -17,7 +17,7 @@ from kinertia.findings.finding import Finding, finding
 from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import BoolArray, Markers
-from kinertia.trial.sampled_time import runs, span_s
+from kinertia.trial.sampled_data import runs, span_s
 from kinertia.trial.trial_input import Task
 
 SWAY_RAD, SQUAT_M = Limit(np.radians(12.0), "rad", usual=(0.0, np.radians(5.0))), Limit(0.15, "m", usual=(0.0, 0.08))

@@ -25,7 +25,7 @@ from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import Recording
-from kinertia.trial.rms import rms
+from kinertia.trial.sampled_data import rms
 
 _OTHER_PERSON = Limit(0.05, usual=(-0.012, 0.012))
 """Median share by which the distances may differ."""

@@ -9,7 +9,7 @@ from kinertia.diagnostics.subject.movements import task_of
 from kinertia.findings.finding import Finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.trial.leg_coverage import LegCoverage, joined_coverage, leg_coverage, listed
+from kinertia.trial.stances import LegCoverage, joined_coverage, leg_coverage, listed
 from kinertia.trial.trial_input import GAIT, Task
 
 

@@ -9,7 +9,7 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.plates.plate_height import heights_on_plates
 from kinertia.diagnostics.runner import check
-from kinertia.estimation.simultaneous.instruments.model_uncertainty import JOINT_CENTRE_SD_M, WITHOUT_STATIC
+from kinertia.estimation.simultaneous.instruments.priors import JOINT_CENTRE_SD_M, WITHOUT_STATIC
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity

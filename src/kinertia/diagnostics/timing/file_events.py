@@ -9,7 +9,8 @@ from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import FEET, Trial
 from kinertia.trial.file_contents import GaitEvent
-from kinertia.trial.gait_events import (
+from kinertia.trial.plate_assignment import FOOT_NAMES
+from kinertia.trial.stances import (
     EVENT_LIMIT_S,
     contradicted_events,
     counted_from_first_frame,
@@ -17,7 +18,6 @@ from kinertia.trial.gait_events import (
     gait_events,
     sides_exchanged,
 )
-from kinertia.trial.plate_assignment import FOOT_NAMES
 
 
 @check("T311", "T312", "T313", "T314", apart=Limit(EVENT_LIMIT_S, "s"))

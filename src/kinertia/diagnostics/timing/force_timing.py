@@ -34,7 +34,7 @@ from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N
 from kinertia.trial.data import FloatArray
-from kinertia.trial.sampled_time import span_s
+from kinertia.trial.sampled_data import span_s
 
 _LEAST_WINDOW_S = 0.8
 """Parts of half a second of one trial differ by up to 40 ms."""

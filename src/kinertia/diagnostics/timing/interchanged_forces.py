@@ -26,7 +26,7 @@ from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.trial.sampled_time import span_s
+from kinertia.trial.sampled_data import span_s
 
 _BETTER, _EACH_BETTER = 0.8, 0.92
 """Of both trials together, and of either (0.51 to 0.88 where they are interchanged). Where one is late and the other

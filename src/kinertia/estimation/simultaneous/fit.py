@@ -10,19 +10,20 @@ from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
 from kinertia.estimation.simultaneous.instruments.impacts import down_weighted
 from kinertia.estimation.simultaneous.instruments.instrument_errors import OTHER_SIGN
-from kinertia.estimation.simultaneous.instruments.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
-from kinertia.estimation.simultaneous.instruments.priors import InstrumentInformation
-from kinertia.estimation.simultaneous.linear_algebra.bandwidth import Bandwidth
+from kinertia.estimation.simultaneous.instruments.priors import (
+    GAIT27_UNCERTAINTY,
+    InstrumentInformation,
+    ModelUncertainty,
+)
+from kinertia.estimation.simultaneous.linear_algebra.motion_basis import Bandwidth
 from kinertia.estimation.simultaneous.markers.marker_noise import MarkerNoise
-from kinertia.estimation.simultaneous.observation import Observations, observe, reading
-from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
+from kinertia.estimation.simultaneous.observation import CalibrationPrior, Observation, Observations, observe, reading
 from kinertia.estimation.simultaneous.outcome import SimultaneousResult
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.estimation.simultaneous.terms.all_terms import TERMS
 from kinertia.estimation.simultaneous.terms.cost_term import CostTerm
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
-from kinertia.estimation.simultaneous.uncertainty.missing_load_evidence import MissingLoad
-from kinertia.estimation.simultaneous.uncertainty.model_evidence import FreeMomentSign
+from kinertia.estimation.simultaneous.uncertainty.evidence import FreeMomentSign, MissingLoad
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import PosteriorDraws
 from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import Unlikeness, unlikeness
 from kinertia.model.bsp import BodySegmentParameters

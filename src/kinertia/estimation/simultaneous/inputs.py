@@ -1,23 +1,154 @@
-"""Holds the input of the simultaneous estimate, and the person's model as a function of its unknowns."""
+"""Holds the input of the simultaneous estimate, the vector of its static unknowns, and the model made of them."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal, Self
 
 import numpy as np
 
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.instruments.plates import FootPlates
-from kinertia.estimation.simultaneous.layout import Layout
 from kinertia.estimation.simultaneous.linear_algebra.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.markers.skin import SkinPatterns
-from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
+from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors
+from kinertia.estimation.simultaneous.observation import CalibrationPrior, Observation
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.log_cholesky import from_log_cholesky
 from kinertia.model.skeleton import Skeleton
 
 BSP, STILL, PLACES, SKIN = "bsp", "static coordinates", "marker places", "skin"
 """Names of the model's unknowns."""
+_SEEN_BY = ("root", "both", "markers")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Unknowns:
+    """Defines k unknowns of one kind that a cost term adds to the estimate: their name, unit and prior.
+
+    Attributes:
+        name: by which `Layout` finds them.
+        unit: of each.
+        start: (k,) where the search begins, and the mean of a normal prior.
+        prior: fault-free or faulty, for unknowns that only the ground reactions depend on; (k,) standard deviations of
+            a normal prior; None: the term has a prior of its own.
+        seen_by: what depends on them: the root equations, the markers or both.
+        of_laboratory: whether other people of a session share them.
+        in_models: whether a model of rigid segments, as in OpenSim's subsequent tools, can represent them. The exported
+            motion absorbs the effect of the others on the forces.
+        displaced_sd: per trial (k,) prior standard deviations of their offsets in it; empty if they have none.
+    """
+
+    name: str
+    unit: str
+    start: np.ndarray
+    prior: ErrorPriors | np.ndarray | None
+    seen_by: Literal["root", "both", "markers"] = "root"
+    of_laboratory: bool = False
+    in_models: bool = True
+    displaced_sd: tuple[np.ndarray, ...] = ()
+
+    @classmethod
+    def errors(
+        cls, name: str, unit: str, prior: ErrorPriors, *, of_laboratory: bool = False, in_models: bool = True
+    ) -> Self:
+        """Define errors of the ground reactions, all zero at the start."""
+        start = np.zeros(len(prior.own))
+        return cls(name=name, unit=unit, start=start, prior=prior, of_laboratory=of_laboratory, in_models=in_models)
+
+    @property
+    def _order(self) -> tuple[int, bool, bool]:
+        return _SEEN_BY.index(self.seen_by), isinstance(self.prior, ErrorPriors), not self.of_laboratory
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Order of all unknowns in the vector.
+
+    First come the unknowns that only root equations depend on, ending with errors of the ground reactions (the
+    laboratory's before others), then those that markers depend on, too, and last those that only markers depend on.
+
+    Attributes:
+        unknowns: in this order; otherwise in the order of the terms.
+        places: slices of the vector, by name.
+    """
+
+    unknowns: tuple[Unknowns, ...]
+    places: Mapping[str, slice]
+
+    @classmethod
+    def of(cls, unknowns: Iterable[Unknowns]) -> Self:
+        """Arrange the terms' unknowns."""
+        ordered = tuple(sorted(unknowns, key=lambda one: one._order))
+        ends = np.cumsum([len(one.start) for one in ordered]).tolist()
+        places = {one.name: slice(end - len(one.start), end) for one, end in zip(ordered, ends, strict=True)}
+        return cls(ordered, places)
+
+    def __getitem__(self, name: str) -> slice:
+        return self.places[name]
+
+    def _span(self, chosen: Iterable[Unknowns]) -> slice:
+        """Return the slice from the first to the last of these unknowns, which are contiguous."""
+        places = [self[one.name] for one in chosen]
+        return slice(places[0].start, places[-1].stop) if places else slice(0, 0)
+
+    @cached_property
+    def errors(self) -> slice:
+        """Slice of the errors of the ground reactions: all unknowns with a prior of being fault-free or faulty."""
+        return self._span(one for one in self.unknowns if isinstance(one.prior, ErrorPriors))
+
+    @cached_property
+    def error_priors(self) -> ErrorPriors:
+        """Priors of the unknowns in `errors`."""
+        return ErrorPriors.joined([one.prior for one in self.unknowns if isinstance(one.prior, ErrorPriors)])
+
+    @cached_property
+    def laboratory(self) -> slice:
+        """Slice of the errors that other people of a session share."""
+        return self._span(one for one in self.unknowns if one.of_laboratory)
+
+    @cached_property
+    def displaced(self) -> slice:
+        """Slice of the unknowns that have an offset in each trial."""
+        return self._span(one for one in self.unknowns if one.displaced_sd)
+
+    @cached_property
+    def in_root(self) -> slice:
+        """Slice of the unknowns that the root equations depend on."""
+        return slice(0, self._span(one for one in self.unknowns if one.seen_by != "markers").stop)
+
+    @cached_property
+    def in_markers(self) -> slice:
+        """Slice of the unknowns that the markers depend on."""
+        return self._span(one for one in self.unknowns if one.seen_by != "root")
+
+    @cached_property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return sum(len(one.start) for one in self.unknowns)
+
+    @cached_property
+    def start(self) -> np.ndarray:
+        """Values (S,) from which the search starts."""
+        return np.concatenate([one.start for one in self.unknowns])
+
+    @cached_property
+    def weight(self) -> np.ndarray:
+        """Information (S,) of normal priors about the start; zero for unknowns that have another prior."""
+        return np.concatenate(
+            [
+                1.0 / np.square(one.prior) if isinstance(one.prior, np.ndarray) else np.zeros(len(one.start))
+                for one in self.unknowns
+            ]
+        )
+
+    def rigid(self, static: np.ndarray) -> np.ndarray:
+        """Return the unknowns (S,) with those set to zero that rigid segments cannot represent."""
+        result = static.copy()
+        for one in self.unknowns:
+            if not one.in_models:
+                result[self[one.name]] = 0.0
+        return result
 
 
 @dataclass(frozen=True, eq=False)

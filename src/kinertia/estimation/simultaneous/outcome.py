@@ -13,9 +13,7 @@ from kinertia.estimation.simultaneous.search.linearised import Linearised, Point
 from kinertia.estimation.simultaneous.search.problem import MapProblem
 from kinertia.estimation.simultaneous.terms.cost_term import Solution
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
-from kinertia.estimation.simultaneous.uncertainty.instrument_support import InstrumentSupport
-from kinertia.estimation.simultaneous.uncertainty.missing_load_evidence import MissingLoad
-from kinertia.estimation.simultaneous.uncertainty.model_evidence import Evidence
+from kinertia.estimation.simultaneous.uncertainty.evidence import Evidence, InstrumentSupport, MissingLoad
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import PosteriorDraws
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton

@@ -23,24 +23,24 @@ import numpy as np
 
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.linear_algebra.static_information import StaticInformation
-from kinertia.estimation.simultaneous.markers.marker_offsets import as_displaced
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
-from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
+from kinertia.estimation.simultaneous.observation import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.outcome import Ended, SimultaneousResult, result_of
-from kinertia.estimation.simultaneous.search.adapted_prior import AdaptedPrior
-from kinertia.estimation.simultaneous.search.delay_profile import CostProfile
-from kinertia.estimation.simultaneous.search.gauss_newton import GaussNewton, MotionAlone
+from kinertia.estimation.simultaneous.search.delay_profile import CostProfile, with_left_out
+from kinertia.estimation.simultaneous.search.gauss_newton import AdaptedPrior, GaussNewton, MotionAlone, SecantPairs
 from kinertia.estimation.simultaneous.search.linearised import Linearised, Point, Slope
-from kinertia.estimation.simultaneous.search.omitted_unknowns import with_left_out
 from kinertia.estimation.simultaneous.search.problem import MapProblem
-from kinertia.estimation.simultaneous.search.quasi_newton import SecantPairs
 from kinertia.estimation.simultaneous.terms.all_terms import TERMS
+from kinertia.estimation.simultaneous.terms.calibration_terms import as_displaced
 from kinertia.estimation.simultaneous.terms.cost_term import CostTerm
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations, curve_deviations
-from kinertia.estimation.simultaneous.uncertainty.instrument_support import instrument_support
+from kinertia.estimation.simultaneous.uncertainty.evidence import (
+    Evidence,
+    instrument_support,
+    missing_loads,
+    suspected_plates,
+)
 from kinertia.estimation.simultaneous.uncertainty.knot_phases import OfPhases, followed
-from kinertia.estimation.simultaneous.uncertainty.missing_load_evidence import missing_loads, suspected_plates
-from kinertia.estimation.simultaneous.uncertainty.model_evidence import Evidence
 from kinertia.estimation.simultaneous.uncertainty.motion_noise import motion_noise
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import (
     Mode,

@@ -34,10 +34,8 @@ from kinertia.io.c3d.plates import PLATE_TYPES, lab_plates, person_on_plates
 from kinertia.io.c3d.structure import doubts_about, with_plain_samples
 from kinertia.io.c3d.subject import subject_data
 from kinertia.io.c3d.theia import POSE_SD_M, Poses, virtual_markers, virtual_places
-from kinertia.io.lab_axes import to_ground
-from kinertia.io.lab_plates import plate_left_out, to_ground_plates
-from kinertia.io.text.marker_labels import left_out, most_seen, people_among, without_prefixes
-from kinertia.io.text.number_table import expect_file
+from kinertia.io.lab_plates import plate_left_out, to_ground, to_ground_plates
+from kinertia.io.text.number_table import expect_file, left_out, most_seen, people_among, without_prefixes
 from kinertia.io.text.trc import METRES_PER_UNIT, read_as_missing, stand_ins, unknown_unit
 from kinertia.trial.data import FloatArray, Markers, Recording
 from kinertia.trial.file_contents import FileOutputs

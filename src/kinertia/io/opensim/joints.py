@@ -17,7 +17,7 @@ from kinertia.findings.finding import with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.opensim.xml import Element
-from kinertia.model.axis_functions import (
+from kinertia.model.coordinate_map import (
     AxisFunction,
     Composed,
     PiecewisePolynomial,

@@ -14,7 +14,7 @@ from kinertia.io.file_names import RESULT_FILES, missing_file
 from kinertia.io.marker_set_draft import MarkerSetDraft, draft_marker_set, preset_of
 from kinertia.io.marker_set_file import marker_set_of, preset_name
 from kinertia.io.recording import ADDED_FILES, CORTEX, MARKER_FILES, read_recording
-from kinertia.io.subject.measures_file import is_measures_sheet
+from kinertia.io.subject.body_files import is_measures_sheet
 from kinertia.io.subject.tables import Model, PriorFiles, TrialFiles, entry_line
 from kinertia.io.text.qualisys import plates_beside
 from kinertia.model.marker_set import MarkerSet

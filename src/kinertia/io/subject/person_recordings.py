@@ -22,8 +22,8 @@ from kinertia.io.subject.tables import SubjectFile, TrialFiles
 from kinertia.io.text.csv_file import has_columns, read_csv
 from kinertia.io.text.sto import read_table
 from kinertia.model.marker_set import MarkerSet
-from kinertia.trial.belt import Belt
 from kinertia.trial.data import Recording
+from kinertia.trial.file_contents import Belt
 from kinertia.trial.plate_loading import with_unloaded_levels
 from kinertia.trial.plate_names import selected, with_plates_of_trial
 from kinertia.trial.trial_input import TrialInput

@@ -59,8 +59,7 @@ from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.io.file_names import trouble_as_folders
 from kinertia.io.subject.provenance import command_line
-from kinertia.io.subject.tables import TABLES, StudyFile, SubjectFile
-from kinertia.io.subject.values import CodedError, shown
+from kinertia.io.subject.tables import TABLES, CodedError, StudyFile, SubjectFile, shown
 from kinertia.io.text.toml_lines import Location, TomlFile, read_toml
 from kinertia.model.anthropometry import check_subject
 from kinertia.settings import Diagnostics, Settings, Table, number_of

@@ -16,9 +16,8 @@ from kinertia.findings.finding import Finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.lab_plates import LabPlates, to_ground_plates
-from kinertia.io.text.number_table import mismatch, read_lines, read_rows
+from kinertia.io.text.number_table import mismatch, read_lines, read_rows, uneven
 from kinertia.io.text.sto import header_entry, other_count
-from kinertia.io.text.uniform_times import uneven
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
 
 _TITLE, _COLUMNS = "[Force Data]", "#Sample"

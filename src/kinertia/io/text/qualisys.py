@@ -17,10 +17,15 @@ from kinertia.errors import FileError
 from kinertia.findings.finding import Finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.io.lab_axes import to_ground
-from kinertia.io.lab_plates import LabPlates, PlateMoments, contradicting_moments, plate_left_out, to_ground_plates
-from kinertia.io.text.marker_labels import most_seen
-from kinertia.io.text.number_table import mismatch, read_lines, read_rows
+from kinertia.io.lab_plates import (
+    LabPlates,
+    PlateMoments,
+    contradicting_moments,
+    plate_left_out,
+    to_ground,
+    to_ground_plates,
+)
+from kinertia.io.text.number_table import mismatch, most_seen, read_lines, read_rows
 from kinertia.io.text.sto import header_entry, other_count
 from kinertia.io.text.trc import seen_positions
 from kinertia.trial.data import FloatArray, Markers, Recording

@@ -13,10 +13,18 @@ from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.results.output_folder import write_then_rename
-from kinertia.io.text.marker_labels import most_seen, without_prefixes
-from kinertia.io.text.number_table import malformed, mismatch, read_lines, read_rows
+from kinertia.io.text.number_table import (
+    malformed,
+    mismatch,
+    most_seen,
+    read_lines,
+    read_rows,
+    rounding_s,
+    times_rounded,
+    uneven,
+    without_prefixes,
+)
 from kinertia.io.text.sto import header_entry, other_count
-from kinertia.io.text.uniform_times import rounding_s, times_rounded, uneven
 from kinertia.trial.data import BoolArray, FloatArray, Markers, Recording
 
 METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001}

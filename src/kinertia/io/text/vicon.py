@@ -19,13 +19,17 @@ from kinertia.errors import FileError
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.io.lab_axes import to_ground
-from kinertia.io.lab_plates import LabPlates, PlateMoments, contradicting_moments, plate_left_out, to_ground_plates
-from kinertia.io.text.marker_labels import without_prefixes
-from kinertia.io.text.number_table import malformed, mismatch, read_lines, wrong_cells
+from kinertia.io.lab_plates import (
+    LabPlates,
+    PlateMoments,
+    contradicting_moments,
+    plate_left_out,
+    to_ground,
+    to_ground_plates,
+)
+from kinertia.io.text.number_table import malformed, mismatch, read_lines, uneven, without_prefixes, wrong_cells
 from kinertia.io.text.sto import header_entry
 from kinertia.io.text.trc import METRES_PER_UNIT, seen_positions, unknown_unit
-from kinertia.io.text.uniform_times import uneven
 from kinertia.trial.data import FloatArray, Markers, Recording
 
 _HEADER_LINES = 5

@@ -6,15 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.estimation.change import MOST_WALKS, PRIMARY, SOURCES, Change
-from kinertia.estimation.curve_changes import CurveChange
-from kinertia.estimation.gait_changes import NOTABLE
+from kinertia.estimation.changes.change import MOST_WALKS, NOTABLE, PRIMARY, SOURCES, Change
+from kinertia.estimation.changes.curve_changes import CurveChange
 from kinertia.report.figures import style
 from kinertia.report.figures.cycle_figures import band, mean_line
 from kinertia.report.figures.figure import Figure, Panel, plain, shaded, small_multiples, written
 from kinertia.report.figures.style import SIDES
 from kinertia.report.wording import INTERVAL_SD
-from kinertia.trial.sampled_time import runs
+from kinertia.trial.sampled_data import runs
 
 _DIGITS = {"N m/kg": 3, "degrees": 1, "m/s": 2, "steps/min": 1, "m": 3, "%": 1}
 RELEVANT = {"N m/kg": 0.1, "degrees": 5.0, "m/s": 0.1, "steps/min": 5.0, "m": 0.05, "%": 2.0}

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.estimation.cycles import UNITS as UNITS_OF_CURVES
-from kinertia.estimation.result import Fit
+from kinertia.estimation.result.cycles import UNITS as UNITS_OF_CURVES
+from kinertia.estimation.result.fit import Fit
 from kinertia.model.bsp import PARAMETERS, UNITS
 from kinertia.report.figures import style
 from kinertia.report.figures.bsp_figures import NAMES, segment_name

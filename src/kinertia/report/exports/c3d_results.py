@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from kinertia.errors import FileError
-from kinertia.estimation.leg_outputs import output_times, outputs_of
-from kinertia.estimation.result import Fit
-from kinertia.estimation.trial_fit import TrialFit
+from kinertia.estimation.result.fit import Fit
+from kinertia.estimation.result.leg_outputs import output_times, outputs_of
+from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.io.c3d.events import EventToWrite
 from kinertia.io.c3d.outputs import C3dFrames, Measure, OutputPoint, frames_of, too_many, unit_factor, with_outputs
 from kinertia.io.c3d.parameters import TooManyParameters, Value
@@ -21,7 +21,7 @@ from kinertia.io.versions import VERSION
 from kinertia.model.bsp import PARAMETERS
 from kinertia.model.marker_set import shared_prefix, spellings
 from kinertia.motion.gait_cycle import Stride, feet_under_pelvis, found_events
-from kinertia.motion.joint_wrench import leg_joints
+from kinertia.motion.joint_moments import leg_joints
 from kinertia.motion.model_outputs import CONVENTIONS, UNITS, Convention, ModelOutput
 from kinertia.motion.spatiotemporal import Spatiotemporal, spatiotemporal
 from kinertia.report.exports.saved_fit import SavedFit

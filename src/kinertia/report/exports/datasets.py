@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from kinertia.errors import KinertiaError, how_to_install
-from kinertia.estimation.cycles import UNITS, cycle_curves
-from kinertia.estimation.drawn_fit import chosen_draws, drawn_fit
-from kinertia.estimation.result import Fit
-from kinertia.estimation.trial_fit import TrialFit
+from kinertia.estimation.result.cycles import UNITS, cycle_curves
+from kinertia.estimation.result.drawn_fit import chosen_draws, drawn_fit
+from kinertia.estimation.result.fit import Fit
+from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.io.versions import VERSION
 from kinertia.model.bsp import PARAMETERS
 from kinertia.trial.data import FEET

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from kinertia.estimation.drawn_fit import chosen_draws, drawn_fit
-from kinertia.estimation.result import Fit
+from kinertia.estimation.result.drawn_fit import chosen_draws, drawn_fit
+from kinertia.estimation.result.fit import Fit
 from kinertia.io.text.sto import write_table
 from kinertia.report.exports.files import coordinates_table, write_model
 from kinertia.report.exports.opensim_files import write_ground_reactions

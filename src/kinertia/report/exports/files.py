@@ -15,14 +15,11 @@ import numpy as np
 
 from kinertia.diagnostics.result.masses import mass_from_force_kg
 from kinertia.diagnostics.result.suitability import suitability
-from kinertia.estimation.cycles import columns_of, phase_columns, spatiotemporal_columns
-from kinertia.estimation.forces_used import forces_before, forces_used
 from kinertia.estimation.identifiability import BaseParameters
-from kinertia.estimation.joint_curves import JointCurves
-from kinertia.estimation.leg_moments import moment_coverage
-from kinertia.estimation.moment_peaks import peak_columns
-from kinertia.estimation.result import Fit
-from kinertia.estimation.trial_fit import TrialFit
+from kinertia.estimation.result.cycles import columns_of, peak_columns, phase_columns, spatiotemporal_columns
+from kinertia.estimation.result.fit import Fit
+from kinertia.estimation.result.leg_moments import forces_before, forces_used, moment_coverage
+from kinertia.estimation.result.trial_fit import JointCurves, TrialFit
 from kinertia.findings.finding import Severity
 from kinertia.io.opensim.exporter import export_osim
 from kinertia.io.results.output_folder import complete_folder, expect_own_folder
@@ -37,7 +34,7 @@ from kinertia.report.figures.cycle_figures import CurvesByStage, drawn_curves
 from kinertia.report.pages.page import render
 from kinertia.report.pages.truth_comparison import Truth
 from kinertia.report.wording import asymmetry_sentences
-from kinertia.trial.rms import rms, rms_length
+from kinertia.trial.sampled_data import rms, rms_length
 
 FIT_FILES = ("fit.json", FIT_FILE, "report.html", "bsp.csv", "model.osim")
 """Names of results that every fit has."""

@@ -6,26 +6,24 @@ from pathlib import Path
 
 from kinertia.errors import FileError
 from kinertia.estimation.identifiability import BaseParameters, Combination
-from kinertia.estimation.joint_curves import JointCurves
-from kinertia.estimation.result import Fit
+from kinertia.estimation.result.fit import Fit
+from kinertia.estimation.result.trial_fit import JointCurves, TrialFit
 from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
 from kinertia.estimation.simultaneous.fit import Posterior
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentInformation
 from kinertia.estimation.simultaneous.markers.marker_noise import MarkerNoise
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
-from kinertia.estimation.simultaneous.uncertainty.missing_load_evidence import MissingLoad
-from kinertia.estimation.simultaneous.uncertainty.model_evidence import FreeMomentSign
+from kinertia.estimation.simultaneous.uncertainty.evidence import FreeMomentSign, MissingLoad
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import PosteriorDraws, TrialDraws
 from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import OneSided, Unlikeness
-from kinertia.estimation.trial_fit import TrialFit
 from kinertia.findings.finding import Finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.results.object_archive import read_archive, write_archive
 from kinertia.io.subject.provenance import Provenance
 from kinertia.io.versions import VERSION, versions
-from kinertia.model.axis_functions import Composed, PiecewisePolynomial
 from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.coordinate_map import Composed, PiecewisePolynomial
 from kinertia.model.coordinate_range import Range
 from kinertia.model.imported_model import Coupling, OsimCoordinate, OsimJoint, OsimModel
 from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton
@@ -37,9 +35,8 @@ from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.smoothing import SmoothedSpline
 from kinertia.report.pages.truth_comparison import Truth
 from kinertia.settings import Overrule, Settings, Subject
-from kinertia.trial.belt import Belt
 from kinertia.trial.data import FootLoads, Markers, Trial
-from kinertia.trial.file_contents import FileEvent, FileOutputs
+from kinertia.trial.file_contents import Belt, FileEvent, FileOutputs
 
 FIT_FILE = "fit.npz"
 

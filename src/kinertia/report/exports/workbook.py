@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.estimation.cycles import (
+from kinertia.estimation.result.cycles import (
     UNITS,
     Kind,
     curves_by_stage,
@@ -17,9 +17,9 @@ from kinertia.estimation.cycles import (
     phase_columns,
     spatiotemporal_columns,
 )
-from kinertia.estimation.result import Fit
+from kinertia.estimation.result.fit import Fit
+from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.estimation.simultaneous.calibration_entry import calibration_columns
-from kinertia.estimation.trial_fit import TrialFit
 from kinertia.io.versions import VERSION
 from kinertia.motion.gait_cycle import PERCENT
 from kinertia.report.exports.files import write_columns

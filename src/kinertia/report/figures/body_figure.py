@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from kinertia.estimation.identifiability import evidence
-from kinertia.estimation.result import Fit
+from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.simultaneous.fit import Posterior
 from kinertia.report.figures import style
 from kinertia.report.figures.bsp_figures import estimated_rows, segment_name

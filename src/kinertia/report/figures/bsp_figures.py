@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.estimation.result import Fit
+from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.simultaneous.fit import Posterior
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.report.figures import style

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kinertia.estimation.result import Fit
-from kinertia.model.shared_coordinates import by_side
+from kinertia.estimation.result.fit import Fit
+from kinertia.model.coordinate_pairs import by_side
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.model_outputs import CLINICAL_ANGLES
 from kinertia.settings import SignConvention

@@ -12,16 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.estimation.curve_source import Stage
-from kinertia.estimation.cycles import FORCES, UNITS, CycleCurve, Kind, curves_by_stage
-from kinertia.estimation.mean_cycles import common_strides, main_task, mean_of, mean_of_common
-from kinertia.estimation.result import Fit
+from kinertia.estimation.result.curve_source import Stage
+from kinertia.estimation.result.cycles import FORCES, UNITS, CycleCurve, Kind, curves_by_stage
+from kinertia.estimation.result.fit import Fit
+from kinertia.estimation.result.mean_cycles import common_strides, main_task, mean_of, mean_of_common
 from kinertia.io.norms_file import Norm
-from kinertia.model.shared_coordinates import by_side, opposite_on_left
+from kinertia.model.coordinate_pairs import by_side, opposite_on_left
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.gait_cycle import PERCENT, Phase
-from kinertia.motion.joint_moments import component_names, joint_and_side
-from kinertia.motion.joint_wrench import body_joints
+from kinertia.motion.joint_moments import body_joints, component_names, joint_and_side
 from kinertia.motion.model_outputs import CLINICAL_ANGLES
 from kinertia.report.figures import style
 from kinertia.report.figures.coordinate_titles import (
@@ -36,7 +35,7 @@ from kinertia.report.figures.figure import Figure, Panel, compact, plain, shaded
 from kinertia.report.wording import INTERVAL_SD, USUAL, start_of
 from kinertia.settings import SignConvention
 from kinertia.trial.data import FEET
-from kinertia.trial.sampled_time import runs
+from kinertia.trial.sampled_data import runs
 
 MOST_STRIDES = 100
 """Largest number of strides of a trial and side; if there are more, this many are taken, evenly spread."""

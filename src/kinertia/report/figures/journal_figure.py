@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kinertia.errors import FileError, KinertiaError
-from kinertia.estimation.result import Fit
+from kinertia.estimation.result.fit import Fit
 from kinertia.report.figures.figure import Figure
 from kinertia.report.figures.plots import FitFigures
-from kinertia.trial.sampled_time import runs
+from kinertia.trial.sampled_data import runs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

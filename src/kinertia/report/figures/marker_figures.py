@@ -4,14 +4,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kinertia.estimation.trial_fit import TrialFit
+from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.model.marker_set import MarkerSet
 from kinertia.report.figures import style
 from kinertia.report.figures.figure import Figure, base_layout, compact, plain
 from kinertia.report.figures.skeleton_view import Scene, plate_corners
 from kinertia.trial.data import Markers, Recording
-from kinertia.trial.rms import rms_by_marker
-from kinertia.trial.sampled_time import runs
+from kinertia.trial.sampled_data import rms_by_marker, runs
 
 _ROW_PX = 17
 _LABELS = {"automargin": True, "dtick": 1, "gridcolor": "#EFEFEF"}

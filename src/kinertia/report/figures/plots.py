@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Generic, TypeVar, get_args
 
 from kinertia.errors import KinertiaError
-from kinertia.estimation.cycles import UNITS, Kind
-from kinertia.estimation.result import Fit
-from kinertia.estimation.trial_fit import TrialFit
+from kinertia.estimation.result.cycles import UNITS, Kind
+from kinertia.estimation.result.fit import Fit
+from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.io.norms_file import read_norms
 from kinertia.report.figures.body_figure import Shown, body_figure
 from kinertia.report.figures.bsp_figures import change_figure, departure_figure, information_figure

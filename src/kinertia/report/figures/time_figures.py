@@ -11,8 +11,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from kinertia.estimation.forces_used import full_bandwidth
-from kinertia.estimation.trial_fit import TrialFit
+from kinertia.estimation.result.leg_moments import full_bandwidth
+from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.joint_moments import component_names, joint_and_side
 from kinertia.motion.kinematics import Kinematics
@@ -22,9 +22,8 @@ from kinertia.report.figures.figure import Figure, Panel, compact, shaded, small
 from kinertia.report.wording import INTERVAL_SD, LITERATURE, Start
 from kinertia.settings import SignConvention
 from kinertia.trial.file_contents import GaitEvent
-from kinertia.trial.gait_events import gait_events
-from kinertia.trial.rms import rms, rms_length
-from kinertia.trial.sampled_time import runs
+from kinertia.trial.sampled_data import rms, rms_length, runs
+from kinertia.trial.stances import gait_events
 
 MOST_FRAMES = 1200
 """Largest number of frames drawn per curve."""

@@ -20,9 +20,8 @@ from kinertia.report.pages.page import MOST_TRIALS, VIEW_FRAMES
 from kinertia.report.pages.rendering import rendered
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N, Markers, PlateLoads
-from kinertia.trial.sampled_time import nearest_samples
-from kinertia.workflow.check import ModelOverview
-from kinertia.workflow.recording import RecordingCheck
+from kinertia.trial.sampled_data import nearest_samples
+from kinertia.workflow.check import ModelOverview, RecordingCheck
 
 _LEFT_OUT = "left out"
 _MOST_UNFOLDED = 4

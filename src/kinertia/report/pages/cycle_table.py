@@ -5,9 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinertia.estimation.cycles import CycleCurve, spatiotemporal_columns
-from kinertia.estimation.moment_peaks import peak_columns
-from kinertia.estimation.result import Fit
+from kinertia.estimation.result.cycles import CycleCurve, peak_columns, spatiotemporal_columns
+from kinertia.estimation.result.fit import Fit
 from kinertia.report.wording import INTERVAL_SD
 from kinertia.trial.data import FEET
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.estimation.result import Fit
-from kinertia.estimation.trial_fit import TrialFit
+from kinertia.estimation.result.fit import Fit
+from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.motion.model_outputs import ModelOutput, model_outputs
 from kinertia.report.figures import style
 from kinertia.report.figures.coordinate_titles import Coordinate
@@ -15,7 +15,7 @@ from kinertia.report.figures.figure import Figure, small_multiples, written
 from kinertia.report.figures.time_figures import MOST_FRAMES, panel_over_time, time_axis
 from kinertia.report.wording import INTERVAL_SD
 from kinertia.trial.file_contents import FileOutputs
-from kinertia.trial.sampled_time import nearest_samples
+from kinertia.trial.sampled_data import nearest_samples
 
 _SHOWN = {"ANGLES": (0, 1.0, "deg"), "MOMENTS": (0, 1e-3, "N m/kg"), "POWERS": (2, 1.0, "W/kg")}
 """Component that is compared (flexion, of angle and moment), with its factor and unit here."""

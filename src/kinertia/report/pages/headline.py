@@ -12,8 +12,8 @@ import numpy as np
 
 from kinertia.diagnostics.result.suitability import Suitability, suitability
 from kinertia.estimation.identifiability import INFORMED, MEASURED, evidence
-from kinertia.estimation.result import Fit
-from kinertia.estimation.trial_fit import TrialFit
+from kinertia.estimation.result.fit import Fit
+from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.findings.finding import Severity
 from kinertia.findings.overview import DO_NOT_USE, USES, WITH_CARE
 from kinertia.model.bsp import PARAMETERS
@@ -21,7 +21,7 @@ from kinertia.report.figures.bsp_figures import DEPARTURE_SD, NAMES, departures,
 from kinertia.report.figures.coordinate_titles import title_of
 from kinertia.report.figures.time_figures import motion_change
 from kinertia.report.wording import decimals, expected_of, fixed, read_in
-from kinertia.trial.rms import rms
+from kinertia.trial.sampled_data import rms
 
 _LISTED_FAR = 12
 _EVIDENCE = {

@@ -10,14 +10,13 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from kinertia.estimation.forces_used import forces_used, full_bandwidth
-from kinertia.estimation.gait_profile import gait_profile
 from kinertia.estimation.identifiability import evidence
-from kinertia.estimation.leg_moments import coverage_sentence, gaps_sentence
-from kinertia.estimation.mean_cycles import fits_by_task, main_task
-from kinertia.estimation.result import Fit
+from kinertia.estimation.result.fit import Fit
+from kinertia.estimation.result.gait_profile import gait_profile
+from kinertia.estimation.result.leg_moments import coverage_sentence, forces_used, full_bandwidth, gaps_sentence
+from kinertia.estimation.result.mean_cycles import fits_by_task, main_task
+from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.estimation.simultaneous.calibration_entry import SHOWN_UNIT, item_text, quantity_text
-from kinertia.estimation.trial_fit import TrialFit
 from kinertia.io.norms_file import Norm
 from kinertia.io.subject.provenance import Provenance
 from kinertia.io.versions import versions
@@ -67,9 +66,8 @@ from kinertia.report.pages.truth_comparison import Truth, truth_rows
 from kinertia.report.pages.vicon_differences import differences_view
 from kinertia.report.wording import INTERVAL_SD, asymmetry_sentences, decimals, expected_of, fixed, read_in, start_of
 from kinertia.trial.data import FEET
-from kinertia.trial.gait_events import gait_events
-from kinertia.trial.rms import rms_by_marker, rms_length
-from kinertia.trial.sampled_time import runs
+from kinertia.trial.sampled_data import rms_by_marker, rms_length, runs
+from kinertia.trial.stances import gait_events
 
 MOST_TRIALS = 6
 """Trials whose curves are shown; all are in the table of residuals and in the files."""

@@ -15,7 +15,7 @@ from kinertia.io.versions import VERSION
 from kinertia.report.figures.journal_figure import has_matplotlib
 from kinertia.report.pages.rendering import Part, drawing, render_parts
 from kinertia.studies.table1 import CONDITIONS, PUBLISHED, Table1, table1_json
-from kinertia.trial.rms import rms
+from kinertia.trial.sampled_data import rms
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.estimation.result import Fit
+from kinertia.estimation.result.fit import Fit
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.report.wording import INTERVAL_SD
-from kinertia.trial.rms import rms
+from kinertia.trial.sampled_data import rms
 
 JOINTS = {
     "hip flexion": ("hip_flexion",),

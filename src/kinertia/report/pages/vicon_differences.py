@@ -13,20 +13,19 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kinertia.estimation.leg_outputs import outputs_of
-from kinertia.estimation.result import Fit
+from kinertia.estimation.result.fit import Fit
+from kinertia.estimation.result.leg_outputs import outputs_of
+from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.estimation.simultaneous.calibration_entry import DELAY, GAIN
-from kinertia.estimation.trial_fit import TrialFit
 from kinertia.motion.ground_reactions import measured_reactions
-from kinertia.motion.joint_moments import component_signs
-from kinertia.motion.joint_wrench import joint_wrenches, leg_joints
+from kinertia.motion.joint_moments import component_signs, joint_wrenches, leg_joints
 from kinertia.motion.smoothing import smooth
 from kinertia.motion.vicon_points import ViconPoints
 from kinertia.report.figures import style
 from kinertia.report.pages.file_outputs import moment_divisor
 from kinertia.report.wording import INTERVAL_SD
 from kinertia.trial.data import FEET
-from kinertia.trial.sampled_time import nearest_samples, runs
+from kinertia.trial.sampled_data import nearest_samples, runs
 
 COMPONENTS = ("flexion", "adduction", "rotation")
 _LOADED_N = 20.0

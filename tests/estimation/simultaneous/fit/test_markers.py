@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from kinertia.estimation.prior import literature_prior
-from kinertia.estimation.simultaneous.instruments.model_uncertainty import GAIT27_UNCERTAINTY
-from kinertia.synthetic.noise import camera_noise
+from kinertia.estimation.simultaneous.instruments.priors import GAIT27_UNCERTAINTY
+from kinertia.synthetic.laboratory import camera_noise
 from kinertia.synthetic.walk import walking_subject
 from results import codes, of_estimate
 from short_walk_fit import estimated, fitted

@@ -5,11 +5,15 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from kinertia.estimation.simultaneous.fit import held_against
-from kinertia.estimation.simultaneous.instruments.model_uncertainty import JOINT_CENTRE_SD_M
-from kinertia.estimation.simultaneous.instruments.priors import DELAY_PRIOR_S, FLOOR_PRIOR, PLATE_PRIOR
+from kinertia.estimation.simultaneous.instruments.priors import (
+    DELAY_PRIOR_S,
+    FLOOR_PRIOR,
+    JOINT_CENTRE_SD_M,
+    PLATE_PRIOR,
+)
 from kinertia.synthetic.walk import walking_subject
 from kinertia.trial.centre_of_pressure import centre_of_pressure
-from kinertia.trial.sampled_time import runs
+from kinertia.trial.sampled_data import runs
 from results import entry_of, of_estimate
 from short_walk_fit import estimated, fitted, seen
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.estimation.simultaneous.instruments.model_uncertainty import GAIT27_UNCERTAINTY
+from kinertia.estimation.simultaneous.instruments.priors import GAIT27_UNCERTAINTY
 from results import entry_of, of_estimate
 from short_walk_fit import estimated, seen
 

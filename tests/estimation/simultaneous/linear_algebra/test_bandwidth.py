@@ -3,7 +3,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kinertia.estimation.simultaneous.linear_algebra.bandwidth import Bandwidth
+from kinertia.estimation.simultaneous.linear_algebra.motion_basis import Bandwidth
 from kinertia.motion.smoothing import smooth
 from kinertia.trial.data import FootLoads
 

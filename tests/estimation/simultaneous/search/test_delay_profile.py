@@ -7,10 +7,14 @@ import numpy as np
 import pytest
 
 from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, FaultMixture, GaussianPrior
-from kinertia.estimation.simultaneous.search.delay_profile import CostProfile
+from kinertia.estimation.simultaneous.search.delay_profile import CostProfile, with_left_out
 
 CLOCK, OWN = FaultMixture(0.0003, 0.008, 0.3), FaultMixture(0.00003, 0.01, 0.05)
+
+
 SHOWN_S, SD_S = 0.004, 0.0015
+
+
 FOLLOWS, BODY_SD = 20.0, 0.1
 
 
@@ -111,3 +115,31 @@ def test_where_nothing_is_to_be_profiled_all_is_left_as_it_is():
     profile = CostProfile.of(model, gaussian, place, lambda model, slope, held: pytest.fail("searched"))
     assert profile.here is here
     assert profile.static is place.static
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_they_are_more_unknowns_of_the_estimate(count):
+    """Against the whole problem: data on x + D z, priors on x and z."""
+    rng = np.random.default_rng(104)
+    root, prior = rng.normal(size=(6, 4)), np.diag([1.0, 4.0, 2.0, 0.5])
+    directions, measured = rng.normal(size=(4, count)), rng.normal(size=6)
+    data = root.T @ root
+    covariance = np.linalg.inv(prior + data)
+    estimate = covariance @ root.T @ measured
+    moved, more = with_left_out(directions, data @ directions, directions.T @ prior @ estimate, covariance)
+
+    rows, apart = np.hstack([root, root @ directions]), np.zeros((4, count))
+    whole = np.linalg.inv(rows.T @ rows + np.block([[prior, apart], [apart.T, np.eye(count)]]))
+    np.testing.assert_allclose(estimate + moved, (whole @ rows.T @ measured)[:4], atol=1e-12)
+    np.testing.assert_allclose(covariance + more @ more.T, whole[:4, :4], atol=1e-12)
+
+
+def test_priors_that_are_next_to_exact_leave_nothing_negative():
+    """As where body segment parameters are held: what the data would say of them is lost in rounding."""
+    rng = np.random.default_rng(7)
+    root, directions = rng.normal(size=(6, 4)) * 1e9, rng.normal(size=(4, 2))
+    data = root.T @ root
+    covariance = np.linalg.inv(data) * (1.0 + 1e-9)
+    moved, more = with_left_out(directions, data @ directions, np.ones(2), covariance)
+    assert np.isfinite(moved).all()
+    assert np.isfinite(more).all()

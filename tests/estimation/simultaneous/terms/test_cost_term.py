@@ -8,7 +8,7 @@ import pytest
 from examples import ROOT, blocks
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
-from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
+from kinertia.estimation.simultaneous.observation import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.search.linearised import Point
 from kinertia.estimation.simultaneous.search.problem import MapProblem
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous

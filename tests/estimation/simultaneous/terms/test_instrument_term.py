@@ -1,9 +1,22 @@
 """Zeros of horizontal forces that a tilt of the plates makes."""
 
-import numpy as np
+from dataclasses import replace
 
-from kinertia.estimation.simultaneous.terms.instrument_term import TILT_SD_RAD, ZEROS, InstrumentErrors, mean_loads_n
-from small_problem import small_problem
+import numpy as np
+import pytest
+
+from kinertia.estimation.simultaneous.search.problem import MapProblem
+from kinertia.estimation.simultaneous.terms.instrument_term import (
+    GAINS,
+    MISSING,
+    PLATES,
+    TILT_SD_RAD,
+    ZEROS,
+    InstrumentErrors,
+    MissingLoads,
+    mean_loads_n,
+)
+from small_problem import point, small_problem
 
 
 def test_a_tilt_moves_all_zeros_by_the_load_on_each_plate():
@@ -20,3 +33,55 @@ def test_a_tilt_moves_all_zeros_by_the_load_on_each_plate():
     np.testing.assert_allclose(zeros, TILT_SD_RAD * loads[:, None, None] * np.eye(2))
     assert np.count_nonzero(left_out) == np.count_nonzero(zeros)
     assert problem.left_out(problem.layout.start).shape == (problem.layout.size, 3)
+
+
+STEP = 1e-5
+
+
+@pytest.fixture(scope="module")
+def problem():
+    """The plate under the left foot has incomplete loads."""
+    complete = small_problem()
+    instruments = replace(complete.calibration.instruments, incomplete=frozenset({"second"}))
+    calibration = replace(complete.calibration, instruments=instruments)
+    return MapProblem(complete.skeleton, complete.prior, calibration, complete.trials)
+
+
+def test_complete_loads_have_no_unknowns():
+    complete = small_problem()
+    assert complete.term(MissingLoads).parts == []
+    assert complete.layout[MISSING].start == complete.layout[MISSING].stop
+
+
+def test_only_contacts_of_the_incomplete_plate_have_parts_and_only_in_measured_frames(problem):
+    parts, dynamic = problem.term(MissingLoads).parts, problem.trials[0].dynamic
+    assert [part.vertical for part in parts].count(True) == 1
+    assert {(part.foot, part.plate) for part in parts} == {(1, 1)}
+    assert not any((part.frames & ~dynamic).any() for part in parts)
+
+
+def test_gain_of_an_incomplete_plate_stays_nominal(problem):
+    layout, complete = problem.layout, small_problem().layout
+    sds = [[one.sd for one in each.error_priors.own] for each in (layout, complete)]
+    for name, at in ((PLATES, 5 + 2), (GAINS, 1)):
+        own, other = (each[layout[name].start - layout.errors.start + at] for each in sds)
+        assert own <= other
+        assert layout.error_priors.own[layout[name].start - layout.errors.start + at].fault_probability == 0.0
+
+
+def test_derivatives_by_missing_loads_are_those_of_the_cost(problem):
+    coefficients, static = point(problem)
+    at = np.arange(len(static))[problem.layout[MISSING]]
+    static[at] = np.linspace(0.05, 0.2, len(at))
+    exact = problem.gradient(0, coefficients[0], static)
+    normal = problem.normal(0, coefficients[0], static)
+    np.testing.assert_allclose(normal.static_rhs[at], exact.static_rhs[at], rtol=1e-6)
+    for one in at:
+        costs = []
+        for sign in (-1.0, 1.0):
+            moved = static.copy()
+            moved[one] += sign * STEP
+            costs.append(problem.gradient(0, coefficients[0], moved).cost)
+        slope = (costs[1] - costs[0]) / (2.0 * STEP)
+        assert -exact.static_rhs[one] == pytest.approx(slope, rel=1e-5, abs=1e-3)
+        assert slope != 0.0

@@ -14,14 +14,12 @@ from kinertia.estimation.simultaneous.search.problem import MapProblem
 from kinertia.estimation.simultaneous.solver import _roots_in_trials, _uncertainty
 from kinertia.estimation.simultaneous.terms.instrument_term import CLOCK, PLATES, ZEROS
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import curve_deviations
-from kinertia.estimation.simultaneous.uncertainty.knee_geometry import knee_geometry
 from kinertia.estimation.simultaneous.uncertainty.knot_phases import OfPhases
+from kinertia.estimation.simultaneous.uncertainty.model_errors import block_growth, knee_geometry
 from kinertia.estimation.simultaneous.uncertainty.moment_derivatives import MomentsOfTrial
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import Mode
-from kinertia.estimation.simultaneous.uncertainty.skin_blocks import block_growth
 from kinertia.motion.dynamics import Motion, inverse_dynamics
-from kinertia.motion.joint_moments import component_signs, joint_moments
-from kinertia.motion.joint_wrench import body_joints
+from kinertia.motion.joint_moments import body_joints, component_signs, joint_moments
 from small_problem import SWITCH_S, curved_problem, point, small_problem
 from validation.study_bound import dense_band
 

@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.markers.marker_errors import ErrorProcess
-from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
+from kinertia.estimation.simultaneous.observation import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.search.problem import MapProblem
 from kinertia.estimation.simultaneous.uncertainty import motion_noise as module
 from kinertia.estimation.simultaneous.uncertainty.motion_noise import motion_noise

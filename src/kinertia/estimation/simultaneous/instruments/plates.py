@@ -1,10 +1,14 @@
-"""Defines the errors of force plates and synchronisation, and corrects ground reactions for them.
+"""Defines the errors of force plates and synchronisation, and corrects loads for them, with derivatives.
 
 Each plate may be displaced from its recorded position in the floor's plane, rotated about the vertical, have a wrong
 gain, read a false vertical moment in proportion to the vertical force (crosstalk of its channels), and have a zero
 offset of its horizontal forces, which acts at its middle while somebody stands on it. All plates may be displaced or
 rotated together relative to the cameras; forces may be delayed, in all trials or in one. The plates belong to the
 laboratory: their displacements are in its axes and are shared by all trials; their zero offsets are not.
+
+The zero offsets are subtracted from the load on a plate first; then the load is rotated about the vertical through the
+plate's middle, moved to the plate's true position, corrected for crosstalk into the vertical moment, and multiplied by
+the gain. The errors of a plate are a row of seven: PLATE_ERRORS, then ZERO_UNKNOWNS, of `plates`.
 """
 
 from collections.abc import Sequence
@@ -13,7 +17,7 @@ from typing import Self
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.instruments import plate_loads
+from kinertia.model.compiled import Float2, Float3, Int2, compiled, part
 from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.smoothing import SmoothedSpline
 from kinertia.trial.centre_of_pressure import centre_of_pressure
@@ -32,6 +36,8 @@ ZERO_UNKNOWNS = {"zero x": "N", "zero z": "N"}
 and are reset, so that the next trial has other zero offsets."""
 _UP = np.array([0.0, 1.0, 0.0])
 _FIRM_N = 5 * LOAD_THRESHOLD_N
+X, Z, GAIN, FREE_MOMENT, TURN, ZERO_X, ZERO_Z = range(7)
+"""Indices of a plate's errors."""
 
 
 def plates_with_floor(count: int) -> np.ndarray:
@@ -101,14 +107,138 @@ class FootPlates:
 
         `loaded` (n, 2) is 1 where the foot stands.
         """
-        return plate_loads.by_plate(*self._as_compiled(loads, loaded, carrier, plates))
+        return by_plate(*self._as_compiled(loads, loaded, carrier, plates))
 
     def corrected_loads(
         self, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray, plates: np.ndarray
     ) -> np.ndarray:
         """Correct loads (k, 2, 6) on plates (k, 2) with errors (p, 7), with zero offsets where `loaded` (k, 2)."""
-        return plate_loads.corrected_loads(*self._as_compiled(loads, loaded, carrier, plates))
+        return corrected_loads(*self._as_compiled(loads, loaded, carrier, plates))
 
     def _as_compiled(self, *arrays: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Return the arguments of `plate_loads`: these, the middles and the rotation, all contiguous."""
+        """Return the arguments of the compiled functions: these, the middles and the rotation, all contiguous."""
         return tuple(map(np.ascontiguousarray, (*arrays, self.middles, self.turn)))
+
+
+@compiled
+def corrected_loads(
+    loads: Float3,
+    loaded: Float2,
+    carrier: Int2,
+    plates: Float2,
+    middles: Float2,
+    turn: Float2,
+) -> np.ndarray:
+    """Correct loads on the feet (n, 2, 6) for the plates' errors.
+
+    Args:
+        loads: (n, 2, 6) as the plates gave them: force (N), moment about the ground origin (N m).
+        loaded: (n, 2) 1 where the foot stands, so that zero offsets count.
+        carrier: (n, 2) index of the plate under each foot.
+        plates: (p, 7) their errors.
+        middles: (p, 3) m, centres of their rotation.
+        turn: (3, 3) rotation from the laboratory's axes to the axes of the loads.
+    """
+    result, own, push = np.empty(loads.shape), np.empty(6), np.empty(6)
+    for i in range(loads.shape[0]):
+        for foot in range(loads.shape[1]):
+            plate = carrier[i, foot]
+            for k in range(6):
+                own[k] = loads[i, foot, k]
+            for zero, axis in ((ZERO_X, 0), (ZERO_Z, 2)):
+                _push(axis, middles[plate], turn, push)
+                for k in range(6):
+                    own[k] -= loaded[i, foot] * plates[plate, zero] * push[k]
+            _correct(own, middles[plate], plates[plate], turn, result[i, foot])
+    return result
+
+
+@compiled
+def by_plate(
+    loads: Float3,
+    loaded: Float2,
+    carrier: Int2,
+    plates: Float2,
+    middles: Float2,
+    turn: Float2,
+) -> np.ndarray:
+    """Compute the derivatives (n, 2, 6, p, 7) of the output of `corrected_loads` by the plates' errors.
+
+    The arguments are the same, except that `loads` (n, 2, 6) are corrected.
+    """
+    n, feet, _ = loads.shape
+    result = np.zeros((n, feet, 6, len(plates), plates.shape[1]))
+    # a zero offset acts as a force at the plate's middle, corrected like any load
+    pushed, push = np.empty((len(plates), 2, 6)), np.empty(6)
+    for plate in range(len(plates)):
+        for k, axis in enumerate((0, 2)):
+            _push(axis, middles[plate], turn, push)
+            _correct(push, middles[plate], plates[plate], turn, pushed[plate, k])
+    place = np.empty(3)
+    for i in range(n):
+        for foot in range(feet):
+            plate = carrier[i, foot]
+            own, load = result[i, foot, :, plate], loads[i, foot]
+            for r in range(3):
+                place[r] = middles[plate, r] + plates[plate, X] * turn[r, 0] + plates[plate, Z] * turn[r, 2]
+            _by_place(load, turn, own)
+            _by_turn(load, place, own)
+            own[4, FREE_MOMENT] = load[1]
+            for k in range(6):
+                own[k, GAIN] = load[k] / (1.0 + plates[plate, GAIN])
+                own[k, ZERO_X] = -loaded[i, foot] * pushed[plate, 0, k]
+                own[k, ZERO_Z] = -loaded[i, foot] * pushed[plate, 1, k]
+    return result
+
+
+@part
+def _push(axis: int, middle: np.ndarray, turn: np.ndarray, out: np.ndarray) -> None:
+    """Write the load (6,) of 1 N along an axis of the laboratory at the middle of a plate into `out`."""
+    x, y, z = turn[0, axis], turn[1, axis], turn[2, axis]
+    out[0], out[1], out[2] = x, y, z
+    out[3] = middle[1] * z - middle[2] * y
+    out[4] = middle[2] * x - middle[0] * z
+    out[5] = middle[0] * y - middle[1] * x
+
+
+@part
+def _correct(load: np.ndarray, middle: np.ndarray, wrong: np.ndarray, turn: np.ndarray, out: np.ndarray) -> None:
+    """Write the plate load (6,), corrected for all errors except zero offsets, into `out`."""
+    x, y, z = middle[0], middle[1], middle[2]
+    fx, fy, fz = load[0], load[1], load[2]
+    # about the middle
+    mx, my, mz = load[3] - (y * fz - z * fy), load[4] - (z * fx - x * fz), load[5] - (x * fy - y * fx)
+    cosine, sine = np.cos(wrong[TURN]), -np.sin(wrong[TURN])
+    fx, fz = cosine * fx + sine * fz, cosine * fz - sine * fx
+    mx, mz = cosine * mx + sine * mz, cosine * mz - sine * mx
+    x += wrong[X] * turn[0, 0] + wrong[Z] * turn[0, 2]
+    y += wrong[X] * turn[1, 0] + wrong[Z] * turn[1, 2]
+    z += wrong[X] * turn[2, 0] + wrong[Z] * turn[2, 2]
+    gain = 1.0 + wrong[GAIN]
+    out[0], out[1], out[2] = gain * fx, gain * fy, gain * fz
+    out[3] = gain * (mx + y * fz - z * fy)
+    out[4] = gain * (my + z * fx - x * fz + wrong[FREE_MOMENT] * fy)
+    out[5] = gain * (mz + x * fy - y * fx)
+
+
+@part
+def _by_place(load: np.ndarray, turn: np.ndarray, out: np.ndarray) -> None:
+    """Write the derivatives of a corrected load (6,) by the plate's position to their columns of out (6, 7)."""
+    for place, axis in ((X, 0), (Z, 2)):
+        x, y, z = turn[0, axis], turn[1, axis], turn[2, axis]
+        out[3, place] = y * load[2] - z * load[1]
+        out[4, place] = z * load[0] - x * load[2]
+        out[5, place] = x * load[1] - y * load[0]
+
+
+@part
+def _by_turn(load: np.ndarray, place: np.ndarray, out: np.ndarray) -> None:
+    """Write the derivative of a corrected load (6,) by its plate's rotation, at this position (3,), to out (6, 7)."""
+    x, y, z = place[0], place[1], place[2]
+    mx, mz = load[3] - (y * load[2] - z * load[1]), load[5] - (x * load[1] - y * load[0])
+    # the loads are rotated backwards: v becomes (-v_z, 0, v_x)
+    fx, fz = -load[2], load[0]
+    out[0, TURN], out[2, TURN] = fx, fz
+    out[3, TURN] = y * fz - mz
+    out[4, TURN] = z * fx - x * fz
+    out[5, TURN] = mx - y * fx

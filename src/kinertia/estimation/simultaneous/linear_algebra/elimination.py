@@ -17,9 +17,8 @@ from typing import Self
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.linear_algebra.arrays_on_disk import KeptArrays
 from kinertia.estimation.simultaneous.linear_algebra.block_tridiagonal import BlockBand, solve_lower
-from kinertia.estimation.simultaneous.linear_algebra.frame_blocks import TimeBlock, halves
+from kinertia.estimation.simultaneous.linear_algebra.frame_blocks import KeptArrays, TimeBlock, halves
 from kinertia.estimation.simultaneous.linear_algebra.normal_equations import (
     SPLINES_PER_BLOCK,
     Gradient,

@@ -1,16 +1,19 @@
-"""Splits a trial into time blocks: for two threads, and to limit the memory of a long trial.
+"""Splits a trial into time blocks, for two threads and to limit memory; stores arrays of long trials on disk.
 
 Splines are coupled only to their neighbours. Those of one time block can be eliminated as soon as all frames that touch
 them are summed, and later blocks need only one block of splines from them (`elimination`). The frames of a time block
 touch its own splines and the first block of splines of the next, which gets its other terms from its own frames.
 """
 
+import mmap
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Self
+from typing import IO, Self
 
 import numpy as np
 
+from kinertia.errors import KinertiaError
 from kinertia.estimation.simultaneous.linear_algebra.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.linear_algebra.normal_equations import SPLINES_PER_BLOCK, NormalEquations
 from kinertia.estimation.simultaneous.markers.marker_errors import LATER
@@ -22,9 +25,9 @@ _SHARE = 16
 """Inverse of the share of it that a time block of longer trials takes."""
 _FRAMES_OF_GRADIENT = 2000
 """Approximate number of frames of a time block for gradients, which need less memory: fewer would take longer."""
-
-
 _SLICES = ("splines", "touched", "frames")
+_ALIGNED = mmap.ALLOCATIONGRANULARITY
+"""Groups begin at multiples of it in the file (bytes), as mapping them requires."""
 
 
 @dataclass(frozen=True)
@@ -104,3 +107,47 @@ def time_blocks_of_trials(bases: Sequence[MotionBasis], coordinates: int, static
     if sum(basis.size for basis in bases) > most:
         most //= _SHARE
     return [time_blocks(basis, most) for basis in bases]
+
+
+class KeptArrays:
+    """Groups of arrays in a temporary file, which is created with the first group and deleted with this object.
+
+    >>> kept = KeptArrays()
+    >>> kept.add(np.arange(3.0), np.ones((2, 2), np.float32))
+    >>> [array.tolist() for array in kept.get(0)]
+    [[0.0, 1.0, 2.0], [[1.0, 1.0], [1.0, 1.0]]]
+    """
+
+    def __init__(self) -> None:
+        self._file: IO[bytes] | None = None
+        self._groups: list[tuple[int, list[tuple[tuple[int, ...], np.dtype[np.generic]]]]] = []
+
+    def add(self, *arrays: np.ndarray) -> None:
+        """Append a group to the file.
+
+        Raises:
+            KinertiaError: the disk has no room for it.
+        """
+        try:
+            if self._file is None:
+                self._file = tempfile.TemporaryFile()  # noqa: SIM115  # it lives as long as this object
+            begin = self._file.seek(0, 2)
+            for array in arrays:
+                self._file.write(np.ascontiguousarray(array).data)
+            self._file.write(bytes(_ALIGNED - self._file.tell() % _ALIGNED))
+            self._file.flush()
+        except OSError as error:
+            raise KinertiaError(
+                f"a long trial needs some 150 MB a minute in the folder for temporary files, {tempfile.gettempdir()}, "
+                f"which cannot be written ({error.strerror}): make room there, or set TMPDIR (Windows: TEMP) to another"
+            ) from error
+        self._groups.append((begin, [(array.shape, array.dtype) for array in arrays]))
+
+    def get(self, k: int) -> list[np.ndarray]:
+        """Return group k, which is read where it is used; what is written to it does not reach the file."""
+        assert self._file is not None
+        begin, kinds = self._groups[k]
+        sizes = [int(np.prod(shape)) * dtype.itemsize for shape, dtype in kinds]
+        mapped = mmap.mmap(self._file.fileno(), sum(sizes), access=mmap.ACCESS_COPY, offset=begin)
+        starts = np.cumsum([0, *sizes[:-1]]).tolist()
+        return [np.ndarray(shape, dtype, mapped, start) for start, (shape, dtype) in zip(starts, kinds, strict=True)]

@@ -1,16 +1,41 @@
-"""Builds the Gauss-Newton quadratic of the cost at one point, and solves it for steps."""
+"""Takes steps: Gauss-Newton on the cost's quadratic, quasi-Newton (L-BFGS) on top of it.
 
+Gauss-Newton leaves out second derivatives of the residuals. Along a few nearly flat directions these are as large as
+what it retains: there its steps are repeatedly up to twice too long, or half as long as they should be. A pair of a
+step and of the change of the gradient along it corrects the quadratic in that direction (Liu and Nocedal 1989, Math
+Program 45:503), and a gradient takes a tenth of the time of a new quadratic.
+
+A precision that is negative nearly cancels the information of the data for which it was made: with slightly different
+data, errors would grow without limit. So the Gaussian is updated when the information has changed, too, and not only
+when the errors have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
 
 import numpy as np
+import scipy.linalg
 
 from kinertia.estimation.simultaneous.linear_algebra.static_information import StaticInformation
-from kinertia.estimation.simultaneous.markers.marker_offsets import Displaced
-from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
+from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, GaussianPrior
 from kinertia.estimation.simultaneous.search.linearised import Linearised, Point
 from kinertia.estimation.simultaneous.search.problem import MapProblem
+from kinertia.estimation.simultaneous.terms.calibration_terms import Displaced
+
+_MOST_PAIRS = 16
+_LEAST_CURVATURE = 0.02
+"""Share of the expected curvature along a step; pairs with less are discarded."""
+_ALIKE_SD = 0.02
+"""The instruments' Gaussian is updated when their mean has moved by more, in standard deviations of all of them
+together, ..."""
+_ALIKE_SHARE = 0.3
+"""... and by more than this share of the distance of all unknowns from the optimum."""
+_ALIKE_INFORMATION = 0.1
+"""It is also updated when the information on any combination of them has changed by more than this share."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,3 +129,84 @@ class MotionAlone:
         trials = zip(self.here.trials, pull.coefficients, strict=True)
         motions = [trial.motion_step(trial.forward(own)[0], np.zeros(0)).ravel() for trial, own in trials]
         return np.concatenate([*motions, np.zeros(len(rhs) - sum(motion.size for motion in motions))])
+
+
+@dataclass(frozen=True, eq=False)
+class SecantPairs:
+    """Pairs of steps taken (n,) and of the decrease of the gradient along each (n,).
+
+    >>> pairs = SecantPairs().with_pair(np.array([1.0, 0.0]), np.array([2.0, 0.0]), expected=1.0)
+    >>> pairs.step(np.array([4.0, 3.0]), lambda rhs: rhs)
+    array([2., 3.])
+    """
+
+    steps: tuple[np.ndarray, ...] = ()
+    changes: tuple[np.ndarray, ...] = ()
+
+    def with_pair(self, step: np.ndarray, change: np.ndarray, expected: float) -> SecantPairs:
+        """Append a pair, in place of the oldest of many, if the step shows a fair share of the expected curvature."""
+        if not step @ change > _LEAST_CURVATURE * expected:
+            return self
+        return SecantPairs((*self.steps, step)[-_MOST_PAIRS:], (*self.changes, change)[-_MOST_PAIRS:])
+
+    def stiffer(self, places: slice, more: np.ndarray) -> SecantPairs:
+        """Return the pairs after the cost has gained this information (m, m) on some of the unknowns."""
+        changes = tuple(change.copy() for change in self.changes)
+        for step, change in zip(self.steps, changes, strict=True):
+            change[places] += step[places] @ more
+        return SecantPairs(self.steps, changes)
+
+    def step(self, rhs: np.ndarray, known: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """Compute the step (n,) for a right-hand side, given `known`, which computes it without these pairs."""
+        pairs = [(step, change, 1.0 / (step @ change)) for step, change in zip(self.steps, self.changes, strict=True)]
+        left, shares = rhs.copy(), []
+        for step, change, inverse in reversed(pairs):
+            shares.append(inverse * (step @ left))
+            left -= shares[-1] * change
+        result = known(left)
+        for (step, change, inverse), share in zip(pairs, reversed(shares), strict=True):
+            result += (share - inverse * (change @ result)) * step
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class AdaptedPrior:
+    """The instruments' Gaussian, with the posterior that it gave them when it was made: mean (k,), information (k, k).
+
+    Where it was not made with the same data, the mean is infinite.
+    """
+
+    gaussian: GaussianPrior
+    mean: np.ndarray
+    information: np.ndarray
+
+    @classmethod
+    def at_first(cls, priors: ErrorPriors) -> AdaptedPrior:
+        """Return the Gaussian of the priors, before any data."""
+        return cls.elsewhere(GaussianPrior.of(priors))
+
+    @classmethod
+    def elsewhere(cls, gaussian: GaussianPrior) -> AdaptedPrior:
+        """Return a Gaussian that was made without the data, or with others."""
+        return cls(gaussian, np.full(len(gaussian.pull), np.inf), gaussian.precision)
+
+    def again(self, priors: ErrorPriors, mean: np.ndarray, covariance: np.ndarray, far: float) -> AdaptedPrior:
+        """Update the Gaussian from the posterior mean and covariance under the present one.
+
+        It is unchanged if the mean has hardly moved compared with the distance `far` from the optimum, in half the
+        square of standard deviations, and the information is about the same in all directions.
+        """
+        information = np.linalg.inv(covariance)
+        if np.isfinite(self.mean).all() and self._is_alike(mean, information, far):
+            return self
+        data, rhs = information - self.gaussian.precision, information @ mean - self.gaussian.pull
+        gaussian = GaussianPrior.given(priors, data, rhs)
+        information = data + gaussian.precision
+        return AdaptedPrior(gaussian, np.linalg.solve(information, rhs + gaussian.pull), information)
+
+    def _is_alike(self, mean: np.ndarray, information: np.ndarray, far: float) -> bool:
+        away = mean - self.mean
+        if away @ self.information @ away > max(_ALIKE_SD**2, _ALIKE_SHARE**2 * 2.0 * far):
+            return False
+        change = np.abs(scipy.linalg.eigvalsh(information - self.information, self.information)).max()
+        return bool(change < _ALIKE_INFORMATION)

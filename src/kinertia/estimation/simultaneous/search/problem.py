@@ -12,8 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from kinertia.estimation.prior import BspPrior
-from kinertia.estimation.simultaneous.inputs import FreedModel, Given
-from kinertia.estimation.simultaneous.layout import Layout
+from kinertia.estimation.simultaneous.inputs import FreedModel, Given, Layout
 from kinertia.estimation.simultaneous.linear_algebra.elimination import Eliminated
 from kinertia.estimation.simultaneous.linear_algebra.frame_blocks import (
     TimeBlock,
@@ -22,7 +21,7 @@ from kinertia.estimation.simultaneous.linear_algebra.frame_blocks import (
     time_blocks_of_trials,
 )
 from kinertia.estimation.simultaneous.linear_algebra.normal_equations import EquationsPool, Gradient, NormalEquations
-from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
+from kinertia.estimation.simultaneous.observation import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.search.linearised import Linearised, Point, Slope
 from kinertia.estimation.simultaneous.terms.all_terms import TERMS
 from kinertia.estimation.simultaneous.terms.cost_term import CostTerm, GroundLoads, InTrial, Solution

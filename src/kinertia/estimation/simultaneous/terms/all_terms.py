@@ -1,18 +1,12 @@
 """Lists the cost terms of the simultaneous estimate. A new unknown is a new term."""
 
-from kinertia.estimation.simultaneous.terms.bsp_term import BodySegments
+from kinertia.estimation.simultaneous.terms.bsp_term import BodySegments, TaskMasses
+from kinertia.estimation.simultaneous.terms.calibration_terms import MarkerPlaces, Skin, StaticCoordinates
 from kinertia.estimation.simultaneous.terms.cost_term import CostTerm
-from kinertia.estimation.simultaneous.terms.instrument_term import InstrumentErrors
-from kinertia.estimation.simultaneous.terms.marker_positions import MarkerPlaces
+from kinertia.estimation.simultaneous.terms.instrument_term import InstrumentErrors, MissingLoads
 from kinertia.estimation.simultaneous.terms.marker_terms import Markers
-from kinertia.estimation.simultaneous.terms.missing_loads import MissingLoads
-from kinertia.estimation.simultaneous.terms.range_terms import JointRanges
-from kinertia.estimation.simultaneous.terms.root_loads import RootLoads
-from kinertia.estimation.simultaneous.terms.skin_term import Skin
-from kinertia.estimation.simultaneous.terms.start_terms import Start
-from kinertia.estimation.simultaneous.terms.static_coordinates import StaticCoordinates
-from kinertia.estimation.simultaneous.terms.task_masses import TaskMasses
-from kinertia.estimation.simultaneous.terms.trunk_bending import TrunkBending
+from kinertia.estimation.simultaneous.terms.motion_terms import JointRanges, Start
+from kinertia.estimation.simultaneous.terms.root_loads import RootLoads, TrunkBending
 
 TERMS: tuple[type[CostTerm], ...] = (
     StaticCoordinates,

@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.inputs import FreedModel, Given
-from kinertia.estimation.simultaneous.layout import Unknowns
+from kinertia.estimation.simultaneous.inputs import FreedModel, Given, Unknowns
 from kinertia.estimation.simultaneous.linear_algebra.frame_blocks import TimeBlock
 from kinertia.estimation.simultaneous.linear_algebra.normal_equations import Gradient
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior

@@ -23,17 +23,16 @@ from kinertia.estimation.simultaneous.linear_algebra.normal_equations import (
     to_splines,
 )
 from kinertia.estimation.simultaneous.markers.marker_errors import LATER
-from kinertia.estimation.simultaneous.markers.marker_gradient import add_gradient
 from kinertia.estimation.simultaneous.markers.visible_markers import (
     PlacedMarkers,
     SeenMarkers,
+    add_gradient,
     place_markers,
     seen_markers,
 )
 from kinertia.estimation.simultaneous.terms.cost_term import CostTerm, InTrial
 from kinertia.model.compiled import Float1, Float2, Float4, Int1, StridedFloat2, StridedFloat3, compiled, inlined, part
-from kinertia.model.kinematic_tree import hand_down
-from kinertia.model.spatial import inner
+from kinertia.model.kinematic_tree import hand_down, inner
 from kinertia.motion.marker_sums import add_force, add_marker, met_force, swapped
 
 

@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.inputs import STILL
-from kinertia.estimation.simultaneous.layout import Layout
+from kinertia.estimation.simultaneous.inputs import STILL, Layout
 from kinertia.estimation.simultaneous.linear_algebra.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.linear_algebra.normal_equations import (
     NO_BORDER,
@@ -15,14 +14,13 @@ from kinertia.estimation.simultaneous.linear_algebra.normal_equations import (
     NormalEquations,
     write_by_splines,
 )
-from kinertia.estimation.simultaneous.terms.root_gradient import add_root_gradient
+from kinertia.estimation.simultaneous.terms.root_equations import Columns, add_root_gradient, root_columns
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.compiled import Float2, Float4, Int1, StridedFloat3, compiled
 from kinertia.model.kinematic_tree import KinematicTree
 from kinertia.model.log_cholesky import dynamic_jacobian
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, axis_motion
-from kinertia.motion.root_columns import Columns, root_columns
 
 _Moving = tuple[
     KinematicTree,

@@ -22,11 +22,9 @@ import numpy as np
 from kinertia.estimation.simultaneous.linear_algebra.elimination import Branch, Eliminated
 from kinertia.estimation.simultaneous.linear_algebra.normal_equations import write_by_splines
 from kinertia.estimation.simultaneous.search.problem import MapProblem
-from kinertia.estimation.simultaneous.uncertainty.curve_variances import write_variances
-from kinertia.estimation.simultaneous.uncertainty.knee_geometry import knee_geometry
+from kinertia.estimation.simultaneous.uncertainty.curve_variances import EndSpread, MotionSpread, write_variances
+from kinertia.estimation.simultaneous.uncertainty.model_errors import block_growth, knee_geometry
 from kinertia.estimation.simultaneous.uncertainty.moment_derivatives import MomentDerivatives, MomentsOfTrial
-from kinertia.estimation.simultaneous.uncertainty.motion_spread import EndSpread, MotionSpread
-from kinertia.estimation.simultaneous.uncertainty.skin_blocks import block_growth
 from kinertia.motion.moving_windows import even_mean
 from kinertia.motion.workload import side_by_side
 

@@ -15,8 +15,7 @@ import numpy as np
 
 from kinertia.model.compiled import Bool2, Float2, Float3, Float4, Int1, compiled
 from kinertia.model.skeleton import Pose, Skeleton
-from kinertia.motion.joint_moments import joint_axes
-from kinertia.motion.joint_wrench import VirtualAxes
+from kinertia.motion.joint_moments import VirtualAxes, joint_axes
 
 
 @dataclass(frozen=True, eq=False)

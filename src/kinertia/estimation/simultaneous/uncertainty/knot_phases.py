@@ -18,8 +18,7 @@ from kinertia.estimation.simultaneous.search.problem import MapProblem
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
 from kinertia.motion.dynamics import Motion, inverse_dynamics
 from kinertia.motion.ground_reactions import GroundReactions
-from kinertia.motion.joint_moments import joint_moments
-from kinertia.motion.joint_wrench import body_joints
+from kinertia.motion.joint_moments import body_joints, joint_moments
 from kinertia.motion.moving_windows import even_mean
 from kinertia.motion.workload import pieces
 

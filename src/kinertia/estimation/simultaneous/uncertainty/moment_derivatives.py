@@ -2,6 +2,11 @@
 
 Besides the generalised forces these are the three-dimensional moments and forces of `body_joints`, which virtual axes
 give (`joint_wrench`), projected on the axes of the joint coordinate system (`joint_rows`).
+
+At foot contact and foot off, forces change within a shorter time, and a time derivative does not describe the effect of
+a delay. It is replaced by the regression of the loads on the delay, over all likely delays (statistical linearisation),
+which enters like a derivative. Its residual is added as independent. Both together are the mean square change of the
+loads, however they change.
 """
 
 from collections.abc import Sequence
@@ -13,15 +18,48 @@ import numpy as np
 
 from kinertia.estimation.simultaneous.inputs import BSP, STILL
 from kinertia.estimation.simultaneous.search.problem import MapProblem
-from kinertia.estimation.simultaneous.uncertainty.delayed_loads import DelayedLoads, delayed_loads
 from kinertia.estimation.simultaneous.uncertainty.joint_rows import JointRows, add_bodies, take_load
 from kinertia.model.log_cholesky import dynamic_jacobian
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion.dynamics import Motion, axis_motion
+from kinertia.motion.dynamics import Motion, axis_motion, regressor
 from kinertia.motion.ground_reactions import GroundReactions
-from kinertia.motion.joint_wrench import VirtualAxes, body_joints
-from kinertia.motion.regressor import regressor
+from kinertia.motion.joint_moments import VirtualAxes, body_joints
 from kinertia.motion.rigid_body import axis_force_derivatives
+
+_DELAYS = np.linspace(-4.0, 4.0, 25)
+"""Delays in standard deviations, over which the mean squares are taken."""
+
+
+@dataclass(frozen=True)
+class DelayedLoads:
+    """Loads (N, N m) at n times on right and left foot, and the effect of a delay.
+
+    Attributes:
+        loads: (n, 2, 6) without delay.
+        slope: (n, 2, 6) per s of delay.
+        residual: (n, m, 2, 6) residuals from the slope for m delays, times the root of their probability, so that
+            the sum of squares is a mean square; empty (m = 0) if the delay is known.
+    """
+
+    loads: np.ndarray
+    slope: np.ndarray
+    residual: np.ndarray
+
+
+def delayed_loads(reactions: GroundReactions, time: np.ndarray, sd_s: float = 0.0) -> DelayedLoads:
+    """Compute the loads at times (n,) s for a delay with this SD (s); with zero SD the slope is the derivative."""
+    loads, rates = reactions.with_rate(time)
+    n = len(time)
+    if sd_s == 0.0:
+        return DelayedLoads(loads, rates, np.empty((n, 0, 2, 6)))
+    weights = np.exp(-0.5 * np.square(_DELAYS))
+    weights /= weights.sum()
+    delays = sd_s * _DELAYS
+    later = reactions.at((time[:, None] + delays).ravel())
+    changes = later.reshape(n, len(delays), 12) - loads.reshape(n, 1, 12)
+    slope = (weights * delays / (weights @ np.square(delays))) @ changes
+    residual = np.sqrt(weights)[:, None] * (changes - delays[:, None] * slope[:, None])
+    return DelayedLoads(loads, slope.reshape(n, 2, 6), residual.reshape(n, -1, 2, 6))
 
 
 @dataclass(frozen=True)

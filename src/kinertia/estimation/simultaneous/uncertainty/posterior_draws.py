@@ -20,7 +20,7 @@ from scipy.fft import dct, idct
 from scipy.optimize import least_squares
 
 from kinertia.estimation.simultaneous.inputs import BSP, PLACES, STILL
-from kinertia.estimation.simultaneous.instruments.plate_loads import GAIN
+from kinertia.estimation.simultaneous.instruments.plates import GAIN
 from kinertia.estimation.simultaneous.linear_algebra.elimination import Eliminated, Factored
 from kinertia.estimation.simultaneous.linear_algebra.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.linear_algebra.normal_equations import SPLINES_PER_BLOCK

@@ -1,0 +1,210 @@
+"""Defines the change of one outcome between two conditions, and compares speed, cadence and steps.
+
+They hardly depend on instruments or body, so that strides are all of their deviation.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy import stats
+
+from kinertia.estimation.result.cycles import spatiotemporal_columns
+from kinertia.estimation.result.trial_fit import TrialFit
+
+Verdict = Literal["changed", "not shown", "cannot be judged"]
+SOURCES = ("instruments", "body", "markers", "stride")
+PRIMARY = (
+    ("moment", "knee", "adduction", "mid-stance"),
+    ("moment", "knee", "adduction", "late stance"),
+    ("moment", "ankle", "flexion", "push-off"),
+)
+"""Outcomes that are named beforehand: quantity, joint, component and event. The first half of single support has the
+first peak of the knee adduction moment, the second half the second."""
+UNITS = {"moment": "N m/kg", "angle": "degrees"}
+MOST_WALKS = 50
+"""Strides of each condition beyond which nobody would record more."""
+_POWER = 0.8
+
+
+@dataclass(frozen=True)
+class Change:
+    """The change of one outcome between two conditions.
+
+    Attributes:
+        quantity: "moment" or "angle".
+        joint, component, side: as in `joint_moments.sto`: "knee", "adduction", "r".
+        event: one of EVENTS.
+        unit: of the numbers below; moments are internal, over body mass.
+        before, after: means over the strides of each condition.
+        strides: number of strides of each.
+        sd: standard deviation of the difference.
+        sd_by_source: its parts by SOURCES; their squares add up.
+        mdc95: smallest change that these recordings can show.
+        p: probability of at least this difference without any change.
+        stride_sd: spread from stride to stride of each condition, as judged by.
+        assumed: whether that spread is at least the usual one, since a condition has fewer than three strides.
+        doubt: what keeps it from being judged, besides fewer than two strides of a condition.
+
+    Examples:
+        >>> change = Change("moment", "knee", "adduction", "r", "loading", "N m/kg", 0.4, 0.3, (3, 3), 0.02, {}, 0.05)
+        >>> round(change.difference, 6), change.verdict
+        (-0.1, 'changed')
+    """
+
+    quantity: str
+    joint: str
+    component: str
+    side: str
+    event: str
+    unit: str
+    before: float
+    after: float
+    strides: tuple[int, int]
+    sd: float
+    sd_by_source: Mapping[str, float]
+    mdc95: float
+    p: float = np.nan
+    stride_sd: tuple[float, float] = (np.nan, np.nan)
+    assumed: bool = False
+    doubt: str = ""
+
+    @property
+    def difference(self) -> float:
+        """After minus before."""
+        return self.after - self.before
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether the change is beyond what instruments, body, markers and strides make of none."""
+        if self.doubt or not np.isfinite(self.mdc95):
+            return "cannot be judged"
+        return "changed" if abs(self.difference) > self.mdc95 else "not shown"
+
+    def walks_needed(self, change: float) -> int | None:
+        """Return the strides of each condition that show a change of this size in four of five comparisons.
+
+        Instruments, body and markers are taken to be as uncertain with any number; None if MOST do not suffice.
+        """
+        spread = float(np.square(self.stride_sd).sum())
+        shared = self.sd**2 - self.sd_by_source["stride"] ** 2
+        counts = np.arange(2, MOST_WALKS + 1)
+        limits = stats.t.ppf(0.975, 2 * (counts - 1)) + stats.norm.ppf(_POWER)
+        enough = np.flatnonzero(limits * np.sqrt(max(shared, 0.0) + spread / counts) <= abs(change))
+        return int(counts[enough[0]]) if len(enough) else None
+
+    @property
+    def primary(self) -> bool:
+        """Whether the outcome was named beforehand."""
+        return (self.quantity, self.joint, self.component, self.event) in PRIMARY
+
+
+def named_outcome(name: str) -> tuple[str, str, str]:
+    """Return quantity, joint and component of "moment knee_adduction" or "angle knee_angle".
+
+    >>> named_outcome("angle knee_angle"), named_outcome("moment hip_rotation")
+    (('angle', 'knee', 'flexion'), ('moment', 'hip', 'rotation'))
+    """
+    quantity, _, rest = name.partition(" ")
+    joint, _, component = rest.partition("_")
+    return quantity, joint, {"angle": "flexion"}.get(component, component)
+
+
+_SHORTEST_S = 0.8
+"""Of a walk without a whole stride whose pelvis shows its speed: most of a stride, in which speed varies by 10 %."""
+_STANDING_M_S = 0.2
+"""Speed of a pelvis below which the walk is on a treadmill, or none."""
+NOTABLE = 0.05
+"""Relative difference of speed that is pointed out even where it is not shown to be one, chosen here."""
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A spatiotemporal measure: column of `Fit.spatiotemporal`, words of it, its unit, and whether sides are apart."""
+
+    column: str
+    joint: str
+    component: str
+    unit: str
+    sided: bool = False
+
+
+MEASURES = (
+    Measure("cadence_steps_min", "walking", "cadence", "steps/min"),
+    Measure("stride_length_m", "stride", "length", "m"),
+    Measure("stance_percent", "stance", "share", "%", sided=True),
+    Measure("step_width_m", "step", "width", "m"),
+)
+
+
+def speed_change(before: Sequence[TrialFit], after: Sequence[TrialFit]) -> Change | None:
+    """Compare walking speed, with each walk counted once (strides of one walk are alike); None where it is not known.
+
+    One walk against one on a treadmill counts strides instead.
+    """
+    known = [[own for trial in trials if (own := _speeds(trial)).size] for trials in (before, after)]
+    return _change(Measure("speed_m_s", "walking", "speed", "m/s"), "", known)
+
+
+def gait_changes(before: Sequence[TrialFit], after: Sequence[TrialFit]) -> tuple[Change, ...]:
+    """Compare MEASURES between strides, each walk counted once as in `speed_change`; those that are known."""
+    tables = [[spatiotemporal_columns([trial]) for trial in trials] for trials in (before, after)]
+    found = []
+    for measure in MEASURES:
+        for side in ("r", "l") if measure.sided else ("",):
+            known = [[own for table in some if (own := _values(table, measure, side)).size] for some in tables]
+            found.append(_change(measure, side, known))
+    return tuple(one for one in found if one is not None)
+
+
+def _values(table: dict[str, list[object]], measure: Measure, side: str) -> np.ndarray:
+    values = np.array(table[measure.column], dtype=float)
+    own = np.isfinite(values) & (np.array([side in ("", one) for one in table["side"]], dtype=bool))
+    return np.asarray(values[own])
+
+
+def _change(measure: Measure, side: str, known: Sequence[Sequence[np.ndarray]]) -> Change | None:
+    """Compare the values of each walk of both conditions."""
+    if not all(known):
+        return None
+    alone = min(map(len, known)) < 2
+    values = [np.concatenate(each) if alone else np.array([own.mean() for own in each]) for each in known]
+    means = [float(each.mean()) for each in values]
+    counts = [len(each) for each in values]
+    spreads = [float(np.std(each, ddof=1)) if len(each) > 1 else np.nan for each in values]
+    squares = [spread**2 / count for spread, count in zip(spreads, counts, strict=True)]
+    sd = float(np.sqrt(sum(squares)))
+    freedom = sum(squares) ** 2 / max(sum(s**2 / max(n - 1, 1) for s, n in zip(squares, counts, strict=True)), 1e-300)
+    of_sd = stats.t(max(freedom, 1.0)) if np.isfinite(freedom) else None
+    return Change(
+        quantity="gait",
+        joint=measure.joint,
+        component=measure.component,
+        side=side,
+        event="",
+        unit=measure.unit,
+        before=means[0],
+        after=means[1],
+        strides=(counts[0], counts[1]),
+        sd=sd,
+        sd_by_source={source: sd if source == "stride" else 0.0 for source in SOURCES},
+        mdc95=np.nan if of_sd is None else float(of_sd.ppf(0.975)) * sd,
+        p=np.nan if of_sd is None else float(2.0 * of_sd.sf(abs(means[1] - means[0]) / max(sd, 1e-300))),
+        stride_sd=(spreads[0], spreads[1]),
+    )
+
+
+def _speeds(trial: TrialFit) -> np.ndarray:
+    """Return the speed of each stride, m/s; without strides that of the pelvis; empty where neither shows it."""
+    all_strides = np.array(spatiotemporal_columns([trial])["speed_m_s"], dtype=float)
+    strides: np.ndarray = all_strides[np.isfinite(all_strides)]
+    if strides.size or trial.kinematics.trial.belt is not None or trial.course is None:
+        return strides
+    time = trial.kinematics.course_time
+    lasted = float(time[-1] - time[0])
+    if lasted < _SHORTEST_S:
+        return strides
+    first, last = trial.skeleton.root.centre(trial.course[[0, -1]])[:, [0, 2]]
+    speed = float(np.linalg.norm(last - first)) / lasted
+    return np.array([speed] if speed > _STANDING_M_S else [])

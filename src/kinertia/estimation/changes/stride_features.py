@@ -1,0 +1,236 @@
+"""Averages joint moments and angles over phases of each stride, in an estimate and in its posterior draws.
+
+A draw in which only the body, or only plates and synchronisation, depart from the estimate shows what these contribute.
+Strides and their phases are those of the estimate, in every draw.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from kinertia.estimation.result.curve_source import CurveSource, Estimated
+from kinertia.estimation.result.cycles import spread_evenly
+from kinertia.estimation.result.drawn_fit import drawn_fit, kept_draws
+from kinertia.estimation.result.fit import Fit
+from kinertia.estimation.result.trial_fit import TrialFit
+from kinertia.estimation.simultaneous.uncertainty.posterior_draws import PosteriorDraws
+from kinertia.model.coordinate_pairs import by_side
+from kinertia.motion.gait_cycle import PERCENT, Stride
+from kinertia.motion.joint_moments import component_names, joint_and_side
+
+EVENTS = ("loading", "mid-stance", "late stance", "push-off", "swing")
+"""Phases of a stride: both feet, the other foot in the air (first half, second half), both feet again, this foot in the
+air."""
+MOST_CURVES = 20
+"""Strides of each trial and side whose curves are compared, evenly spread; features are of all."""
+_FEWER = 2
+"""Factor by which draws of parts are fewer than of everything: they mostly divide a variance."""
+Key = tuple[str, str, str, str]
+"""Trial, outcome, side, phase and number of the stride; of a curve, the outcome has no event."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """k values, or curves, in an estimate and in n draws of it.
+
+    Attributes:
+        keys: what each is of.
+        estimate: (k,) or (k, 101) their values.
+        drawn: by source (n, k) or (n, k, 101) their values in each draw.
+    """
+
+    keys: tuple[Key, ...]
+    estimate: np.ndarray
+    drawn: Mapping[str, np.ndarray]
+
+
+@dataclass(frozen=True, eq=False)
+class StrideFeatures:
+    """Averages over phases, and some of the curves that they are of."""
+
+    events: Rows
+    curves: Rows
+
+
+def stride_features(
+    fit: Fit,
+    trials: Sequence[TrialFit],
+    sources: Mapping[str, PosteriorDraws],
+    count: int,
+    progress: Callable[[float], None] = lambda share: None,
+    centre: PosteriorDraws | None = None,
+) -> StrideFeatures:
+    """Compute the features of these trials of a fit.
+
+    Args:
+        fit: by the simultaneous estimate.
+        trials: some of its trials.
+        sources: draws of everything ("all") or of a part (`only`).
+        count: number of draws of each, at least two.
+        progress: is told the share done.
+        centre: its first draw takes the place of the estimate, if given.
+    """
+    own = _Strides.of(trials)
+    middle = trials if centre is None else _drawn(fit, trials, centre, 0, False).trials
+    estimate = own.curves(middle, fit.mass_kg)
+    shown = np.isfinite(estimate).any(axis=1)
+    keys, weights, few = own.chosen(shown)
+    counts = {source: count if source == "all" else max(2, count // _FEWER) for source in sources}
+    events: dict[str, np.ndarray] = {}
+    curves: dict[str, np.ndarray] = {}
+    done = 0
+    for source, draws in sources.items():
+        features, rows = [], []
+        for number in range(counts[source]):
+            drawn = own.curves(_drawn(fit, trials, draws, number, source == "all").trials, fit.mass_kg)[shown]
+            features.append(_means(drawn, weights))
+            rows.append(drawn[few].astype(np.float32))
+            done += 1
+            progress(done / sum(counts.values()))
+        events[source], curves[source] = np.array(features), np.array(rows)
+    means = _means(estimate[shown], weights)
+    known = np.isfinite(means)
+    named = [(trial, f"{name} {event}", side, stride) for trial, name, side, stride in keys for event in EVENTS]
+    of_events = tuple(key for key, is_known in zip(named, known, strict=True) if is_known)
+    few_keys = tuple(key for key, is_one in zip(keys, few, strict=True) if is_one)
+    return StrideFeatures(
+        Rows(of_events, means[known], {source: rows[:, known] for source, rows in events.items()}),
+        Rows(few_keys, estimate[shown][few], curves),
+    )
+
+
+def event_means(trials: Sequence[Estimated], mass_kg: float) -> dict[Key, float]:
+    """Return the features of all strides of these trials; moments over this mass."""
+    own = _Strides.of(trials)
+    keys, weights, _ = own.chosen(np.ones(len(own.keys), dtype=bool))
+    means = _means(own.curves(trials, mass_kg), weights)
+    named = ((trial, f"{name} {event}", side, stride) for trial, name, side, stride in keys for event in EVENTS)
+    return {key: float(mean) for key, mean in zip(named, means, strict=True) if np.isfinite(mean)}
+
+
+@dataclass(frozen=True, eq=False)
+class _Strides:
+    """Strides of several trials, and the curves that they have.
+
+    Attributes:
+        strides: of each trial.
+        keys: of all curves, trial by trial.
+        of_curve: the stride of each.
+        few: curves of the strides that `MOST_CURVES` keeps.
+    """
+
+    strides: Sequence[Sequence[Stride]]
+    keys: Sequence[Key]
+    of_curve: Sequence[Stride]
+    few: np.ndarray
+
+    @classmethod
+    def of(cls, trials: Sequence[Estimated]) -> "_Strides":
+        strides = [[one for one in (*trial.strides, *trial.phases) if one.phase != "landing"] for trial in trials]
+        keys: list[Key] = []
+        of_curve: list[Stride] = []
+        few: list[bool] = []
+        for trial, own in zip(trials, strides, strict=True):
+            kept = spread_evenly(own, MOST_CURVES)
+            for stride in own:
+                for name, *_ in _columns(trial, stride.side):
+                    keys.append((trial.name, name, stride.side, f"{stride.phase} {stride.number}"))
+                    of_curve.append(stride)
+                    few.append(stride in kept)
+        return cls(strides, keys, of_curve, np.array(few, dtype=bool))
+
+    def curves(self, trials: Sequence[Estimated], mass_kg: float) -> np.ndarray:
+        """Return the curves (k, 101) of these trials, degrees and N m/kg."""
+        rows: list[np.ndarray] = []
+        for trial, own in zip(trials, self.strides, strict=True):
+            if not own:
+                continue
+            source = CurveSource(trial, "estimate")
+            time = np.concatenate([stride.time for stride in own])
+            angles = np.degrees(source.angle(time)).reshape(len(own), len(PERCENT), -1)
+            moments = source.joint_moment(time) / mass_kg
+            moments = moments.reshape(len(own), len(PERCENT), -1)
+            for k, stride in enumerate(own):
+                for _, is_angle, column in _columns(trial, stride.side):
+                    rows.append((angles if is_angle else moments)[k, :, column])
+        return np.array(rows).reshape(-1, len(PERCENT))
+
+    def chosen(self, shown: np.ndarray) -> tuple[list[Key], np.ndarray, np.ndarray]:
+        """Return keys, weights (k, 5, 101) of EVENTS, and which are kept as curves, of the curves shown."""
+        rows = np.flatnonzero(shown).tolist()
+        weights = np.array([event_weights(self.of_curve[row]) for row in rows]).reshape(-1, len(EVENTS), len(PERCENT))
+        return [self.keys[row] for row in rows], weights, self.few[rows]
+
+
+def _columns(trial: Estimated, side: str) -> Iterator[tuple[str, bool, int]]:
+    """Yield name and column of each angle, and of each component of joint moments, of a leg or of neither."""
+    skeleton = trial.skeleton
+    for base, columns in by_side(skeleton.coordinates).items():
+        column = columns.get(side, columns.get(""))
+        if column is not None and skeleton.rotational[column]:
+            yield f"angle {base}", True, column
+    joints = () if trial.joint_curves is None else trial.joint_curves.joints["estimate"].joints
+    for k, joint in enumerate(joints):
+        base, own = joint_and_side(joint)
+        if own in ("", side):
+            for component, name in enumerate(component_names(base)):
+                yield f"moment {name}", False, 3 * k + component
+
+
+def _means(curves: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Return the mean (k * 5,) of each curve (k, 101) over EVENTS; NaN where some of it, or the event, is unknown."""
+    unknown = np.einsum("kep,kp->ke", (weights > 0.0).astype(float), np.isnan(curves).astype(float)) > 0.0
+    means = np.einsum("kep,kp->ke", weights, np.nan_to_num(curves))
+    return np.where(unknown | ~(weights.sum(axis=2) > 0.0), np.nan, means).reshape(-1)
+
+
+def _drawn(fit: Fit, trials: Sequence[TrialFit], draws: PosteriorDraws, number: int, knees: bool) -> Fit:
+    assert fit.posterior is not None  # it has draws
+    own = replace(draws, trials=tuple(draws.trials[fit.trials.index(trial)] for trial in trials))
+    return drawn_fit(replace(fit, trials=tuple(trials), posterior=replace(fit.posterior, draws=own)), number, knees)
+
+
+def only(draws: PosteriorDraws, body: bool) -> PosteriorDraws:
+    """Return draws in which only the body, or only plates and synchronisation, differ from draw to draw."""
+    trials = tuple(
+        replace(
+            one,
+            coefficients=np.zeros_like(one.coefficients),
+            **({"plates": np.zeros_like(one.plates), "delay_s": np.zeros_like(one.delay_s)} if body else {}),
+            **({"impact": np.zeros_like(one.impact)} if body else {}),
+        )
+        for one in draws.trials
+    )
+    mean = np.broadcast_to(draws.coordinate_values.mean(axis=0), draws.coordinate_values.shape)
+    still = replace(draws, coordinate_values=mean, trials=trials).without_places()
+    return still if body else replace(still, bsp=np.broadcast_to(draws.bsp.mean(axis=0), draws.bsp.shape))
+
+
+def usual_sources(fit: Fit) -> dict[str, PosteriorDraws]:
+    """Return the draws of everything, of the body, and of plates and synchronisation.
+
+    Raises:
+        KinertiaError: the fit has no draws.
+    """
+    draws = kept_draws(fit)
+    return {"all": draws, "body": only(draws, body=True), "instruments": only(draws, body=False)}
+
+
+def event_weights(stride: Stride) -> np.ndarray:
+    """Return the weights (5, 101) that average a curve over each of EVENTS; zero where an event is not known."""
+    bounds = event_bounds(stride)
+    inside = np.array([(first <= PERCENT) & (last >= PERCENT) for first, last in pairwise(bounds)])
+    if stride.phase != "stride":
+        inside[-1] = False  # it ends with stance
+    weights: np.ndarray = inside / np.maximum(inside.sum(axis=1, keepdims=True), 1)
+    return weights
+
+
+def event_bounds(stride: Stride) -> tuple[float, ...]:
+    """Return where in the stride (%) each of EVENTS begins, and the last ends; NaN where a contact is not known."""
+    lifts, strikes, off = (
+        stride.percent(time_s) for time_s in (stride.opposite_toe_off_s, stride.opposite_strike_s, stride.toe_off_s)
+    )
+    return 0.0, lifts, 0.5 * (lifts + strikes), strikes, off, 100.0

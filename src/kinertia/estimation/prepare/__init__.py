@@ -1,0 +1,1 @@
+"""Prepares what an estimator needs of a person: checked input, calibrated model."""

@@ -1,0 +1,246 @@
+"""Defines the result of an estimate for one trial, `TrialFit`, with its curves wherever they are known.
+
+A joint's load needs only the loads distal to it: the moments of a leg on its plate, or in the air, are known whatever
+the other leg does. What is not known is NaN, never zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.dynamics import Motion
+from kinertia.motion.gait_cycle import Stride, contact_phases, strides_of
+from kinertia.motion.ground_reactions import GroundReactions
+from kinertia.motion.kinematics import Kinematics
+from kinertia.trial import display
+from kinertia.trial.trial_input import WITHOUT_STRIDES
+
+if TYPE_CHECKING:
+    import pandas as pd
+from dataclasses import replace
+from typing import Self, TypeAlias
+
+from kinertia.estimation.simultaneous.uncertainty.model_errors import with_drawn_knees
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.motion.dynamics import inverse_dynamics
+from kinertia.motion.joint_moments import BodyJoint, JointMoments, body_joints, joint_moments
+
+Stage: TypeAlias = tuple[Skeleton, BodySegmentParameters, Motion, GroundReactions]
+"""What joint loads are computed from: motion at the frames of `Kinematics.course_time`."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointCurves:
+    """Motion and joint loads at the f frames of `Kinematics.course_time`.
+
+    Attributes:
+        time: (f,) s.
+        known: (f, c) frames in which the generalised force of each coordinate is known.
+        motion: estimated coordinates and derivatives, all frames.
+        forces: (f, c) generalised forces per stage ("literature", "estimate"), N m and N; NaN where not known.
+        joints: three-dimensional moments and forces per stage; NaN where not known.
+        deviations: standard deviations (f, ...) of the estimate, with those of `joints` in the last field; NaN where
+            not known; None for one draw.
+
+    Examples:
+        >>> curves = fit.trials[0].joint_curves  # fit = kinertia.fit_subject("subject.toml")
+        >>> knee = curves.joints["estimate"].moments[:, curves.joints["estimate"].joints.index("knee_r")]
+        >>> knee.shape[1], "knee_r_adduction" in curves.joints["estimate"].names
+        (3, True)
+    """
+
+    time: np.ndarray
+    known: np.ndarray
+    motion: Motion
+    forces: Mapping[str, np.ndarray]
+    joints: Mapping[str, JointMoments]
+    deviations: CurveDeviations | None
+
+    @property
+    def moment_sd(self) -> np.ndarray | None:
+        """Standard deviations (f, j, 3) of `joints["estimate"].moments`, N m."""
+        return None if self.deviations is None or self.deviations.joints is None else self.deviations.joints[:, :, 0]
+
+    @property
+    def force_sd(self) -> np.ndarray | None:
+        """Standard deviations (f, j, 3) of `joints["estimate"].forces`, N."""
+        return None if self.deviations is None or self.deviations.joints is None else self.deviations.joints[:, :, 1]
+
+    @classmethod
+    def of(
+        cls,
+        kinematics: Kinematics,
+        motion: Motion,
+        stages: Mapping[str, Stage],
+        deviations: CurveDeviations | None,
+    ) -> Self:
+        """Compute the loads of every stage.
+
+        Args:
+            kinematics: of the trial.
+            motion: estimated, at the frames of `course_time`.
+            stages: skeleton, parameters, motion at these frames and ground reactions of each.
+            deviations: standard deviations at these frames.
+        """
+        time, known = kinematics.course_time, kinematics.course_known
+        forces, joints = {}, {}
+        for name, (skeleton, bsp, moved, reactions) in stages.items():
+            loads, own = reactions.at(time), known_joints(skeleton, known)
+            forces[name] = np.where(known, inverse_dynamics(skeleton, bsp, moved, loads), np.nan)
+            joints[name] = _only(joint_moments(skeleton, bsp, moved, loads), own)
+        if deviations is not None:
+            masked = {each: np.where(known, getattr(deviations, each), np.nan) for each in ("moments", "powers")}
+            three = None if deviations.joints is None else np.where(own[:, :, None, None], deviations.joints, np.nan)
+            deviations = replace(deviations, **masked, joints=three)
+        return cls(time, known, motion, forces, joints, deviations)
+
+    def drawn(self, kinematics: Kinematics, stage: Stage, random: np.random.Generator | None) -> JointCurves:
+        """Return the curves of a draw of the estimate, with knee geometry drawn if `random` is given, without standard
+        deviations."""
+        own = type(self).of(kinematics, stage[2], {"estimate": stage}, None)
+        loads = own.joints["estimate"]
+        if random is not None:
+            loads = with_drawn_knees(stage[0], body_joints(stage[0]), loads, random)
+        return replace(own, forces={**self.forces, **own.forces}, joints={**self.joints, "estimate": loads})
+
+
+def known_joints(skeleton: Skeleton, known: np.ndarray) -> np.ndarray:
+    """Return the mask (f, j) of frames in which the loads of `body_joints` are known, from that of coordinates (f, c).
+
+    A joint that does not move has the frames of the next ones distal to it.
+    """
+    joints = body_joints(skeleton)
+    result = np.zeros((len(known), len(joints)), dtype=bool)
+    for k, joint in enumerate(joints):
+        columns = joint.columns(skeleton) or _beyond(skeleton, joint)
+        result[:, k] = known[:, columns].all(axis=1) & bool(columns)
+    return result
+
+
+def _beyond(skeleton: Skeleton, joint: BodyJoint) -> list[int]:
+    """Return the coordinates of joints distal to a joint."""
+    child = skeleton.support[skeleton.segments.index(joint.child)]
+    after = [own for own in skeleton.support if (own & child).sum() == child.sum()]
+    axes = np.logical_or.reduce(after) & ~child
+    return [int(column) for column in np.unique(skeleton.map.owner[axes])]
+
+
+def _only(loads: JointMoments, known: np.ndarray) -> JointMoments:
+    """Return the loads with NaN where they are not known (n, j)."""
+    shown = known[:, :, None]
+    return replace(loads, moments=np.where(shown, loads.moments, np.nan), forces=np.where(shown, loads.forces, np.nan))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TrialFit:
+    """Result of one trial of a `Fit`. Arrays cover the w frames of the measured windows.
+
+    Attributes:
+        kinematics: markers, coordinates and ground reactions before estimation.
+        skeleton: with this trial's marker positions (`displacement`).
+        motion: estimated coordinates (rad, m), and their derivatives as OpenSim's tools compute them from
+            `kinematics.mot`, by natural quintic splines through the frames. They differ from the estimate's own in the
+            first and last frames only.
+        course: (f, c) coordinates of `kinematics.course_time`: all frames in which any joint's load is known, and
+            those between; None after two-level, which has none there.
+        motion_hz: bandwidth of the motion.
+        reactions: the corresponding ground reactions at the plates' rate, corrected for instrument errors.
+        residuals: root residual (w, 6: force N, moment N m about the pelvis origin, ground axes) per stage:
+            "literature" (no correction), "corrected" (literature BSPs, pelvis correction), "estimate"; forces have the
+            bandwidth of the motion.
+        full_residuals: the same at the forces' full bandwidth, with forces as measured before the estimate and
+            `reactions` after it. The estimate's equal those of OpenSim's inverse dynamics on the result files.
+        joint_loads: joint inverse dynamics (w, c: N m; N for translations) per stage: "literature" (with forces as
+            measured), "estimate" (with `reactions`); after two-level both with forces of the motion's bandwidth.
+            `moments` returns them as tables.
+        deviations: posterior standard deviations of the estimate's curves; None after two-level. `coordinate_sd` and
+            `moment_sd` return them as tables.
+        marker_errors_m: distances (w, m) between measured and model markers per stage: "ik", "final".
+        seconds: computing time per stage.
+        joint_curves: joint loads in three dimensions at the frames of `course`, wherever they are known; None after
+            two-level and in older files.
+
+    Examples:
+        >>> trial = fit.trials[0]  # fit = kinertia.fit_subject("subject.toml")
+        >>> trial.moments["estimate"]["knee_angle_r"].name, list(trial.residuals)
+        ('knee_angle_r', ['literature', 'corrected', 'estimate'])
+    """
+
+    kinematics: Kinematics
+    skeleton: Skeleton
+    motion: Motion
+    motion_hz: float
+    reactions: GroundReactions
+    residuals: Mapping[str, np.ndarray]
+    full_residuals: Mapping[str, np.ndarray]
+    joint_loads: Mapping[str, np.ndarray]
+    deviations: CurveDeviations | None
+    marker_errors_m: Mapping[str, np.ndarray]
+    seconds: Mapping[str, float]
+    course: np.ndarray | None = None
+    joint_curves: JointCurves | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the trial."""
+        return self.kinematics.trial.name
+
+    @property
+    def time(self) -> np.ndarray:
+        """Times (w,) of the frames, s."""
+        return self.kinematics.time
+
+    @property
+    def coordinates(self) -> pd.DataFrame:
+        """Estimated coordinates (rad, m) over time."""
+        return by_coordinate(self.kinematics, self.motion.q)
+
+    @cached_property
+    def coordinate_sd(self) -> pd.DataFrame | None:
+        """Posterior standard deviations of `coordinates`, in the same form; None after two-level."""
+        return None if self.deviations is None else by_coordinate(self.kinematics, self.deviations.coordinates)
+
+    @cached_property
+    def strides(self) -> tuple[Stride, ...]:
+        """Strides of the whole trial, by plates or else motion; none in squats and landings, found or stated."""
+        task = self.kinematics.trial.task
+        return () if task in WITHOUT_STRIDES else strides_of(self.skeleton, self.kinematics)
+
+    @cached_property
+    def phases(self) -> tuple[Stride, ...]:
+        """Phases of contacts with plates that are part of no stride: "stance", or "landing"; none in squats."""
+        return contact_phases(self.skeleton, self.kinematics, self.strides)
+
+    @cached_property
+    def moments(self) -> Mapping[str, pd.DataFrame]:
+        """Joint moments (`joint_loads`) over time, one column per coordinate."""
+        return {stage: by_coordinate(self.kinematics, loads) for stage, loads in self.joint_loads.items()}
+
+    @cached_property
+    def moment_sd(self) -> pd.DataFrame | None:
+        """Posterior standard deviations of the estimated moments, in the same form; None after two-level."""
+        return None if self.deviations is None else by_coordinate(self.kinematics, self.deviations.moments)
+
+    def __repr__(self) -> str:
+        """Return name, time and size only, since all the arrays would fill pages."""
+        start, end = self.kinematics.window_s
+        return f"TrialFit({self.name}: {start:.2f} to {end:.2f} s, {len(self.time)} frames)"
+
+    def _repr_html_(self) -> str:
+        """Return the HTML summary for a notebook: frames used, marker distances, residuals."""
+        return display.html(self)
+
+
+def by_coordinate(kinematics: Kinematics, values: np.ndarray) -> pd.DataFrame:
+    """Return values (w, c) of all coordinates as a table over the time (s) of the measured windows, one column each."""
+    import pandas as pd
+
+    index = pd.Index(kinematics.time, name="time")
+    return pd.DataFrame(values, index=index, columns=list(kinematics.ik.coordinates))

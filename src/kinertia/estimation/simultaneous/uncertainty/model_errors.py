@@ -1,0 +1,128 @@
+"""Adds uncertainty that no unknown has: the geometry of the knee, and skin that moves as a block.
+
+A knee that is a hinge in the model transmits adduction and rotation moments by constraint. They depend on where its
+centre is and where its axis points, which no equation of motion of the estimate can show: a centre that is displaced
+sideways by 5 mm changes the adduction moment by 5 mm times the force along the shank, and an axis that points 4 degrees
+too far forward takes 7 % of the flexion moment for adduction.
+
+Both also define the axes of the segments. The long axes of thigh and shank pass through the knee's centre: where it is
+displaced sideways, 1 % of the flexion moments of hip and ankle is taken for rotation. The thigh's axis to the right is
+the knee's.
+
+Measured over the bone of a walking person (Cereatti et al. 2017, J Biomech, doi 10.1016/j.jbiomech.2017.02.004), the
+thigh's skin moves fore and aft by some 6 mm in the first 12 % of the stride, with twice the acceleration that it has
+elsewhere. Markers that move together look like a thigh that swings: it leaves no residuals, from which the motion's
+errors are derived (`motion_noise`). The error bars of hip flexion moments are longer there, by the effect of that
+person's skin. Draws of the posterior are not wider.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from kinertia.estimation.simultaneous.search.problem import MapProblem
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.joint_moments import BodyJoint, JointMoments, component_signs
+
+CENTRE_SD_M = 0.005
+"""Standard deviation of the knee's centre to the side, chosen here."""
+AXIS_SD_RAD = float(np.radians(4.0))
+"""Standard deviation of its axis' direction about the thigh, chosen here."""
+_NEXT = {"Hip": "Knee", "Knee": "Ankle"}
+GROWTH = 2.0
+"""Of what the markers' errors make of the moment of hip flexion. With it 95 % intervals cover after heel strike, where
+skin moves as measured, nearly as often as elsewhere."""
+LASTS_S = 0.14
+"""From landing on: 12 % of the stride of an unhurried walk."""
+
+
+def knee_geometry(skeleton: Skeleton, joints: Sequence[BodyJoint], loads: np.ndarray) -> np.ndarray:
+    """Return what it adds to the variances (d, 6 j) of the loads of j joints.
+
+    Args:
+        skeleton: of these joints.
+        joints: the joints.
+        loads: (d, 6 j) per joint its moments, then its forces, as in `MomentDerivatives`.
+    """
+    by_centre, by_axis = _derivatives(skeleton, joints, loads)
+    result: np.ndarray = np.square(CENTRE_SD_M * by_centre) + np.square(AXIS_SD_RAD * by_axis)
+    return result
+
+
+def with_drawn_knees(
+    skeleton: Skeleton, joints: Sequence[BodyJoint], loads: JointMoments, random: np.random.Generator
+) -> JointMoments:
+    """Return the loads with centre and axis of each knee displaced at random, once for all frames."""
+    signs = np.array([component_signs(joint) for joint in joints]).reshape(-1, 3)
+    both = np.stack([signs * loads.moments, loads.forces], axis=2)
+    changes = np.zeros(both.shape)
+    drawn = {joint.side: random.normal(0.0, (CENTRE_SD_M, AXIS_SD_RAD)) for joint in joints if joint.name == "Knee"}
+    for by, scale in zip(_derivatives(skeleton, joints, both.reshape(len(both), -1)), range(2), strict=True):
+        displaced = np.array([drawn[joint.side][scale] if joint.side in drawn else 0.0 for joint in joints])
+        changes += displaced[:, None, None] * by.reshape(both.shape)
+    return replace(loads, moments=loads.moments + signs * changes[:, :, 0], forces=loads.forces + changes[:, :, 1])
+
+
+def _derivatives(skeleton: Skeleton, joints: Sequence[BodyJoint], loads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return derivatives (d, 6 j) of loads by displacement of the knee to the right, m, and turn about the thigh, rad.
+
+    The moments are about axes right, forward and up, the forces along axes forward, up and right, which are taken for
+    perpendicular to each other.
+    """
+    lengths_m = _lengths_m(skeleton, joints)
+    by_centre, by_axis = np.zeros((2, len(loads), len(joints), 6))
+    for k, joint in enumerate(joints):
+        about_right, about_forward, about_up, forward, up, right = loads[:, 6 * k : 6 * k + 6].T
+        thigh, shank = (1.0 / lengths_m.get((name, joint.side), np.inf) for name in ("Hip", "Knee"))
+        zero = np.zeros(len(loads))
+        if joint.name == "Hip":
+            by_centre[:, k] = np.stack([zero, zero, -thigh * about_right, zero, -thigh * right, thigh * up], axis=1)
+            by_axis[:, k, 3:] = np.stack([-right, zero, forward], axis=1)
+        elif joint.name == "Knee":
+            turning = [thigh * about_up, up, shank * about_right - forward]
+            by_centre[:, k] = np.stack([*turning, zero, shank * right, -shank * up], axis=1)
+            by_axis[:, k, :2] = np.stack([about_forward, -about_right], axis=1)
+        elif joint.name == "Ankle":
+            by_centre[:, k, :3] = np.stack([-shank * about_up, zero, shank * about_right], axis=1)
+    return by_centre.reshape(loads.shape), by_axis.reshape(loads.shape)
+
+
+def _lengths_m(skeleton: Skeleton, joints: Sequence[BodyJoint]) -> dict[tuple[str, str], float]:
+    """Return the distances of hips to knees and of knees to ankles, by the former and side."""
+    pose = skeleton.pose(np.zeros((1, len(skeleton.coordinates))))
+    centres = {(joint.name, joint.side): joint.centre(skeleton, pose)[0] for joint in joints}
+    return {
+        (name, side): float(np.linalg.norm(place - centres[_NEXT[name], side]))
+        for (name, side), place in centres.items()
+        if (_NEXT.get(name), side) in centres
+    }
+
+
+def block_growth(
+    problem: MapProblem, k: int, static: np.ndarray, time: np.ndarray, joints: Sequence[BodyJoint] = ()
+) -> np.ndarray:
+    """Return factors (n, r) on what the markers' errors make of each moment at these times of trial k.
+
+    The rows r are those of `MomentDerivatives`.
+
+    Args:
+        problem: of the estimate.
+        k: the trial.
+        static: the static unknowns as they are in it.
+        time: (n,) s.
+        joints: those of the moments after those of coordinates.
+    """
+    trial = problem.trials[k]
+    rows = [*problem.skeleton.coordinates, *(f"{joint.label} {axis}" for joint in joints for axis in range(6))]
+    ground = problem.loads.reactions(k, static).loaded_at(trial.time) > 0.0
+    if trial.on_ground is not None:
+        ground |= trial.on_ground
+    landed = np.zeros_like(ground)
+    landed[1:] = ground[1:] & ~ground[:-1]
+    result = np.ones((len(time), len(rows)))
+    for side, at in zip("rl", landed.T, strict=True):
+        landings = np.append(-np.inf, trial.time[at])
+        after = time - landings[np.searchsorted(landings, time, side="right") - 1] < LASTS_S
+        result[np.ix_(after, [row in (f"hip_flexion_{side}", f"hip_{side} 0") for row in rows])] = GROWTH
+    return result

@@ -1,0 +1,184 @@
+"""What changed between two conditions: known changes among made-up strides, and none between a walk and itself."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from command_line import run
+from kinertia.errors import KinertiaError
+from kinertia.estimation.changes import condition_changes
+from kinertia.estimation.changes.change import SOURCES
+from kinertia.estimation.changes.condition_changes import changes, changes_of_strides
+from kinertia.estimation.changes.stride_features import EVENTS, Rows, event_bounds
+from kinertia.motion.gait_cycle import Stride
+from kinertia.report.comparison.change_tables import (
+    change_columns,
+    change_sentences,
+    changed_sentence,
+    discovered,
+    limit_sentences,
+)
+from kinertia.report.exports.saved_fit import write_fit
+
+DRAWS = 1000
+
+
+def judged(change, strides, shared_sd, own_sd, stride_sd, seed=0):
+    """Changes of one outcome: so many strides of two conditions, with errors that all share and that each has."""
+    rng = np.random.default_rng(seed)
+    count = sum(strides)
+    second = np.arange(count) >= strides[0]
+    keys = [(f"walk {k}", "moment knee_adduction late stance", "r", "stride 1") for k in range(count)]
+    truth = 0.3 + change * second + stride_sd * rng.standard_normal(count)
+    errors = shared_sd * rng.standard_normal() + own_sd * rng.standard_normal(count)
+    estimate = truth + errors
+    departures = shared_sd * rng.standard_normal((DRAWS, 1)) + own_sd * rng.standard_normal((DRAWS, count))
+    still = np.broadcast_to(estimate, departures.shape)
+    drawn = {"all": estimate + departures, "body": still, "instruments": still}
+    (found,) = changes_of_strides(Rows(tuple(keys), estimate, drawn), [~second, second])
+    return found
+
+
+def test_errors_that_all_strides_share_cancel():
+    found = judged(0.0, (4, 4), shared_sd=0.5, own_sd=0.01, stride_sd=0.0)
+    assert found.sd_by_source["markers"] == pytest.approx(0.01 * np.sqrt(0.5), rel=0.05)
+    assert found.sd < 0.02
+    assert (found.joint, found.component, found.side, found.event) == ("knee", "adduction", "r", "late stance")
+    np.testing.assert_allclose(np.hypot.reduce(list(found.sd_by_source.values())), found.sd, rtol=1e-6)
+
+
+@pytest.mark.parametrize("own_sd", [0.005, 0.05])
+def test_no_change_is_rarely_called_one_and_a_true_one_mostly(own_sd):
+    """Whether markers or strides vary more."""
+    none, some = ([judged(change, (4, 4), 0.3, own_sd, 0.03, seed) for seed in range(1500)] for change in (0.0, 0.2))
+    assert np.mean([one.verdict == "changed" for one in none]) < 0.08
+    assert np.mean([one.verdict == "changed" for one in some]) > 0.9
+    covered = [abs(one.difference - 0.2) <= one.mdc95 for one in some]
+    assert 0.93 < np.mean(covered) < 1.0
+
+
+def test_one_stride_is_not_judged():
+    found = judged(0.5, (1, 4), 0.1, 0.01, 0.01)
+    assert (found.verdict, found.strides) == ("cannot be judged", (1, 4))
+    assert np.isnan(found.mdc95)
+    assert found.difference == pytest.approx(0.5, abs=0.1)
+
+
+def test_few_strides_vary_no_less_than_is_usual():
+    few, several = (judged(0.0, (count, count), 0.0, 1e-4, 0.0) for count in (2, 5))
+    assert few.sd_by_source["stride"] > 0.015
+    assert several.sd_by_source["stride"] < 0.002
+
+
+def test_a_spread_that_is_assumed_is_said():
+    few, several = (judged(0.0, (count, count), 0.0, 1e-4, 0.0) for count in (2, 5))
+    assert (few.assumed, several.assumed) == (True, False)
+    assert len(list(limit_sentences([few], ""))) == 1
+    assert not list(limit_sentences([several], ""))
+
+
+def test_repeats_needed_show_a_change_and_no_fewer_do():
+    """By simulation, with the spread known as well as these repeats show it."""
+    found = judged(0.0, (6, 6), 0.0, 0.02, 0.05)
+    needed = found.walks_needed(0.1)
+    rng = np.random.default_rng(1)
+    shared = np.hypot(*(found.sd_by_source[source] for source in ("body", "markers")))
+
+    def power(count):
+        first, second = (s * rng.standard_normal((4000, count)) for s in found.stride_sd)
+        change = 0.1 + second.mean(axis=1) - first.mean(axis=1) + shared * rng.standard_normal(4000)
+        of_strides = first.var(axis=1, ddof=1) + second.var(axis=1, ddof=1)
+        limit = stats.t.ppf(0.975, 2 * (count - 1)) * np.sqrt(shared**2 + of_strides / count)
+        return np.mean(np.abs(change) > limit)
+
+    assert power(needed) == pytest.approx(0.8, abs=0.12)
+    assert power(needed - 1) < power(needed)
+    assert found.walks_needed(1e-4) is None
+
+
+def test_events_lie_between_contacts():
+    stride = Stride("r", 1, 10.0, 11.0, 10.6, 10.1, 10.5, True)
+    assert event_bounds(stride) == pytest.approx((0.0, 10.0, 30.0, 50.0, 60.0, 100.0))
+    assert len(event_bounds(stride)) == len(EVENTS) + 1
+
+
+@pytest.fixture(scope="module")
+def twice(fit):
+    """A walk under two conditions, which is one walk."""
+    (trial,), (draws,) = fit.trials, fit.posterior.draws.trials
+
+    def under(condition):
+        own = replace(trial.kinematics.trial, name=condition, condition=condition)
+        return replace(trial, kinematics=replace(trial.kinematics, trial=own))
+
+    posterior = replace(fit.posterior, draws=replace(fit.posterior.draws, trials=(draws, draws)))
+    return replace(fit, trials=(under("barefoot"), under("with shoes")), posterior=posterior)
+
+
+@pytest.fixture(scope="module")
+def found(twice):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(condition_changes, "DRAWS", 6)
+        return changes(twice, "barefoot", "with shoes")
+
+
+def test_a_walk_has_not_changed_from_itself(found):
+    assert {one.quantity for one in found} == {"moment", "angle"}
+    assert {"hip", "knee", "ankle", "lumbar"} <= {one.joint for one in found}
+    assert {one.verdict for one in found} <= {"not shown", "cannot be judged"}
+    assert max(abs(one.difference) for one in found) < 1e-9
+    for one in found:
+        assert set(one.sd_by_source) == set(SOURCES)
+        assert max(one.sd_by_source[source] for source in SOURCES[:3]) < 1e-9, "errors of one walk cancel"
+
+
+def test_tables_and_sentences_have_every_outcome(found):
+    table = pd.DataFrame(change_columns(found))
+    assert len(table) == len(found)
+    assert table["verdict"].tolist() == [one.verdict for one in found]
+    primary = [one for one in found if one.primary]
+    assert len(primary) == len(list(change_sentences(found))) >= 2
+    others = sum(not one.primary and one.verdict != "cannot be judged" for one in found)
+    assert f" {others} other" in changed_sentence(found) or others == 0
+
+
+def test_false_discoveries_are_controlled():
+    """By the step-up rule: 0.03 fails its own limit of 0.025, but 0.035 holds that of 0.0375."""
+    assert discovered([0.5, 0.001, 0.035, 0.03]) == [False, True, True, True]
+    assert discovered([0.5, 0.02, 0.04, 0.04]) == [False] * 4
+    assert discovered([]) == []
+    rng = np.random.default_rng(0)
+    nothing = [any(discovered(rng.random(100))) for _ in range(1000)]
+    assert 0.03 < np.mean(nothing) < 0.07
+
+
+def test_p_and_verdict_agree(found):
+    judged_ones = [one for one in found if one.verdict != "cannot be judged"]
+    assert judged_ones
+    for one in judged_ones:
+        assert (one.p < 0.05) == (one.verdict == "changed")
+
+
+def test_the_command_compares_conditions_of_a_result(twice, fit, tmp_path):
+    (tmp_path / "out").mkdir()
+    write_fit(twice, None, tmp_path / "out" / "fit.npz")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(condition_changes, "DRAWS", 2)
+        outcome = run("compare", tmp_path / "out", "--conditions", "barefoot", "with shoes", "-o", tmp_path / "c")
+        assert outcome.status == 0, outcome.err
+        table = pd.read_csv(tmp_path / "c" / "changes.csv")
+        assert len(table) > 50
+        page = (tmp_path / "c" / "compare.html").read_text(encoding="utf-8")
+        assert page.count("<tr") == len(table) + 3, "a row for each change and the headings of three tables"
+        curves = pd.read_csv(tmp_path / "c" / "change_curves.csv")
+        assert set(curves["percent"]) == set(range(101))
+        assert {"knee", "hip", "ankle"} <= set(curves["joint"])
+        assert np.abs(curves["difference"].dropna()).max() < 1e-9
+        refused = run("compare", tmp_path / "out", "--conditions", "barefoot", "running", "-o", tmp_path / "d")
+    assert refused.status == 2
+    assert "stated are: barefoot, with shoes" in refused.err
+    with pytest.raises(KinertiaError):
+        changes(fit, "barefoot", "with shoes")

@@ -1,0 +1,89 @@
+"""Curves of two conditions: the simultaneous band holds the true difference at all percents together."""
+
+import numpy as np
+import pytest
+
+from kinertia.estimation.changes.curve_changes import CurveChange, curve_changes, paired
+from kinertia.estimation.changes.stride_features import Rows
+from kinertia.motion.gait_cycle import PERCENT
+from kinertia.report.comparison.change_tables import curve_columns, curve_figures, joint_figure
+
+_PHASE = 2.0 * np.pi * PERCENT / 100.0
+SHAPES = np.array([np.ones(101), np.sin(_PHASE), np.cos(_PHASE), np.sin(2 * _PHASE), np.cos(3 * _PHASE)])
+TRUTH = 0.1 * np.exp(-np.square((PERCENT - 30.0) / 10.0))
+
+
+def wavy(rng, sd, count):
+    """Smooth random curves (count, 101)."""
+    return sd / np.sqrt(3.0) * rng.standard_normal((count, len(SHAPES))) @ SHAPES
+
+
+def compared(seed, strides=4, change=1.0, measured_sd=0.01, stride_sd=0.02):
+    """One curve of both sides in two conditions, each stride with errors of its own and of all."""
+    rng = np.random.default_rng(seed)
+    rows = []
+    common, drawn_common = 0.3 * wavy(rng, 1.0, 1), 0.3 * wavy(rng, 1.0, 60)
+    for second in (False, True):
+        keys, estimate, drawn = [], [], []
+        for side in "rl":
+            for k in range(strides):
+                truth = second * change * TRUTH + wavy(rng, stride_sd, 1)[0]
+                own = truth + common[0] + wavy(rng, measured_sd, 1)[0]
+                keys.append((f"{second} {k}", "moment knee_adduction", side, "stride 1"))
+                estimate.append(own)
+                drawn.append(own + drawn_common + wavy(rng, measured_sd, 60))
+        rows.append(Rows(tuple(keys), np.array(estimate), {"all": np.swapaxes(drawn, 0, 1)}))
+    return list(curve_changes(*rows, paired))
+
+
+@pytest.mark.parametrize(("measured_sd", "stride_sd"), [(0.02, 0.005), (0.005, 0.02)])
+def test_the_band_holds_the_whole_curve(measured_sd, stride_sd):
+    """Whether markers or strides vary more; a band of each percent alone would hold it far less often."""
+    together, alone = [], []
+    for seed in range(150):
+        for one in compared(seed, measured_sd=measured_sd, stride_sd=stride_sd):
+            low, high = one.band
+            together.append(((low <= TRUTH) & (high >= TRUTH)).all())
+            alone.append((np.abs(one.difference - TRUTH) <= 1.96 * one.sd).all())
+    assert 0.92 <= np.mean(together) <= 0.995
+    assert np.mean(alone) < 0.85
+
+
+def test_a_change_is_shown_where_it_is():
+    found = [one for seed in range(20) for one in compared(seed, 5, 1.0, 0.005, 0.01)]
+    assert np.mean([one.changed[30] for one in found]) > 0.9
+    assert np.mean([one.changed[90] for one in found]) < 0.1
+    none = [one.changed.any() for seed in range(150) for one in compared(seed, 5, 0.0, 0.005, 0.01)]
+    assert np.mean(none) < 0.08
+
+
+def test_single_strides_have_no_band():
+    for one in compared(0, strides=1):
+        assert np.isnan(one.factor)
+        assert not one.changed.any()
+        assert np.isfinite(one.difference).all()
+
+
+def test_tables_and_figures_have_every_curve():
+    found = compared(0)
+    columns = curve_columns(found)
+    assert {len(values) for values in columns.values()} == {2 * 101}
+    assert columns["lower"][130] == pytest.approx(found[1].band[0][29])
+    assert [one["title"] for one in curve_figures(found, "a", "b")] == ["Knee moments"]
+    figure = joint_figure(found, "Knee moments", "a", "<b>")
+    assert len([trace for trace in figure.data if trace.get("name") == "difference"]) == 2
+    assert "<b>" not in str([trace.get("name") for trace in figure.data])
+
+
+def test_strides_or_stances_are_chosen_by_their_number():
+    rows = []
+    for _ in range(2):
+        keys = [
+            ("walk", "angle knee_angle", "r", "stride 1"),
+            *(("walk", "angle knee_angle", "r", f"stance {k}") for k in (2, 3)),
+        ]
+        values = np.arange(3.0)[:, None] * np.ones(101)
+        rows.append(Rows(tuple(keys), values, {"all": np.array([values, values + 1.0])}))
+    (found,) = curve_changes(*rows, paired)
+    assert isinstance(found, CurveChange)
+    assert (found.phase, found.strides) == ("stance", (2, 2))

@@ -1,0 +1,178 @@
+"""What changed between two sessions of one person: shared errors of the body cancel, all others do not."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import kinertia
+from command_line import run
+from kinertia.errors import KinertiaError
+from kinertia.estimation.changes import session_changes as module
+from kinertia.estimation.changes.session_changes import Session, session, session_changes, why_incomparable
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.report.exports.saved_fit import write_fit
+from report_page import Elements
+
+
+def trial_under(trial, condition, shift_m=0.0):
+    """A walk under a condition, at another place where it is another recording."""
+    markers = trial.kinematics.trial.markers
+    moved = replace(markers, positions=markers.positions + shift_m)
+    own = replace(trial.kinematics.trial, name=condition, condition=condition, markers=moved)
+    return replace(trial, kinematics=replace(trial.kinematics, trial=own))
+
+
+def session_of(fit, condition, shift_m, walks=3):
+    """A session in which one walk was measured as often."""
+    (trial,), (draws,) = fit.trials, fit.posterior.draws.trials
+    posterior = replace(fit.posterior, draws=replace(fit.posterior.draws, trials=(draws,) * walks))
+    trials = [trial_under(trial, condition, shift_m) for _ in range(walks)]
+    named = [
+        replace(one, kinematics=replace(one.kinematics, trial=replace(one.kinematics.trial, name=f"{condition} {k}")))
+        for k, one in enumerate(trials)
+    ]
+    return replace(fit, trials=tuple(named), posterior=posterior)
+
+
+@pytest.fixture(scope="module")
+def sessions(fit):
+    return session_of(fit, "before", 0.0), session_of(fit, "after", 1e-3)
+
+
+def compared(*fits, draws=12):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "DRAWS", draws)
+        return session_changes(*(session(fit) for fit in fits))
+
+
+@pytest.fixture(scope="module")
+def found(sessions):
+    return compared(*sessions)
+
+
+def test_a_walk_has_not_changed_from_itself(found):
+    assert {one.verdict for one in found} <= {"not shown", "cannot be judged"}
+    assert max(abs(one.difference) for one in found) < 1e-9
+    assert {"moment", "angle"} == {one.quantity for one in found}
+
+
+def test_the_body_cancels_and_markers_do_not(found):
+    for one in found:
+        assert one.sd_by_source["body"] < 1e-6
+    moments = [one.sd_by_source["markers"] for one in found if one.quantity == "moment" and one.joint == "knee"]
+    assert min(moments) > 1e-3
+
+
+def test_the_deviation_is_that_of_two_independent_sessions(fit, found):
+    """Angles do not depend on the body: their variances add up."""
+    (trial,) = fit.trials
+    one = next(c for c in found if (c.quantity, c.joint, c.side, c.event) == ("angle", "knee", "r", "mid-stance"))
+    column = fit.skeleton.coordinates.index("knee_angle_r")
+    sd = np.degrees(trial.joint_curves.deviations.coordinates[:, column].mean())
+    factor = module._FIXED_AXES if session(fit).fixed_axes else 1.0
+    assert one.sd_by_source["markers"] == pytest.approx(factor * np.sqrt(2.0) * sd, rel=0.4)
+
+
+def test_a_changed_knee_is_found(sessions):
+    before, after = sessions
+    column = after.skeleton.coordinates.index("knee_angle_r")
+    bent = []
+    for one in after.trials:
+        course = one.course.copy()
+        course[:, column] -= np.radians(20.0)
+        curves = one.joint_curves
+        q = curves.motion.q.copy()
+        q[:, column] -= np.radians(20.0)
+        motion = replace(curves.motion, q=q)
+        bent.append(replace(one, course=course, joint_curves=replace(curves, motion=motion)))
+    found = compared(before, replace(after, trials=tuple(bent)))
+    knee = [one for one in found if (one.quantity, one.joint, one.side) == ("angle", "knee", "r")]
+    assert {one.verdict for one in knee} == {"changed"}
+    assert [one.difference for one in knee] == pytest.approx([-20.0] * len(knee), abs=1.0)
+    other = [one for one in found if (one.quantity, one.joint, one.side) == ("angle", "knee", "l")]
+    assert {one.verdict for one in other} == {"not shown"}
+
+
+def test_both_are_evaluated_with_one_body(sessions):
+    """Estimates of the body that differ by chance are no change of moments."""
+    before, after = sessions
+    table = after.estimate.table().copy()
+    table[:, 0] *= np.where(np.char.startswith(np.array(after.estimate.segments), "shank"), 1.3, 1.0)
+    other = replace(after, estimate=BodySegmentParameters.from_table(after.estimate.segments, table))
+    differences = np.array([one.difference for one in compared(before, other, draws=2)])
+    assert np.abs(differences).max() < 1e-9
+
+
+def test_what_cannot_be_compared_says_why(sessions, two_level):
+    before, after = sessions
+    assert not why_incomparable(before, after)
+    assert "same recording" in why_incomparable(before, before)
+    assert "two-level" in why_incomparable(before, two_level)
+    heavy = replace(after, subject=after.subject.model_copy(update={"mass_kg": 2.0 * after.mass_kg}))
+    assert "one person" in why_incomparable(before, heavy)
+    fewer = replace(after.posterior.draws, segments=after.posterior.draws.segments[:-1])
+    other = replace(after, posterior=replace(after.posterior, draws=fewer))
+    assert "different models" in why_incomparable(before, other)
+    with pytest.raises(KinertiaError, match="same recording"):
+        session_changes(Session(before, "", before.trials), Session(before, "", before.trials))
+
+
+def test_a_session_of_several_conditions_needs_a_choice(sessions):
+    before, _ = sessions
+    mixed = replace(before, trials=(*before.trials[:2], trial_under(before.trials[2], "with brace")))
+    with pytest.raises(KinertiaError, match="several conditions"):
+        session(mixed)
+    assert len(session(mixed, "before").trials) == 2
+    with pytest.raises(KinertiaError, match="no trial"):
+        session(mixed, "running")
+
+
+def test_the_command_compares_sessions_first_of_all_by_joint_moments(sessions, tmp_path):
+    folders = []
+    for name, fit in zip(("before", "after"), sessions, strict=True):
+        (tmp_path / name).mkdir()
+        write_fit(fit, None, tmp_path / name / "fit.npz")
+        folders.append(tmp_path / name)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "DRAWS", 2)
+        outcome = run("compare", *folders, "-o", tmp_path / "c", "--json")
+    assert outcome.status == 0, outcome.err
+    content = json.loads(outcome.out)
+    rows = content["outcomes"]
+    assert {row["quantity"] for row in rows} == {"moment", "angle"}
+    assert "changed" not in {row["verdict"] for row in rows}
+    assert not content["not_compared"]
+    steps = [content["walking_speed"], *content["spatiotemporal"]]
+    assert [step["component"] for step in steps] == ["speed", "cadence", "length", "share", "share", "width"]
+    assert len(pd.read_csv(tmp_path / "c" / "changes.csv")) == len(steps) + len(rows)
+    assert len(pd.read_csv(tmp_path / "c" / "change_curves.csv")) % 101 == 0
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "DRAWS", 2)
+        said = run("compare", *folders, "-o", tmp_path / "c").out
+    assert said.index("Walking speed") < said.index("knee adduction moment") < said.index("ody segment parameters")
+    page = (tmp_path / "c" / "compare.html").read_text(encoding="utf-8")
+    assert page.index('id="changes"') < page.index('id="bsp"')
+    assert page.count("<td>not shown</td>") == sum(row["verdict"] == "not shown" for row in (*steps, *rows))
+    assert page.count('class="plot"') > 8
+
+
+def test_results_that_are_no_sessions_say_why(demo_run, two_level_run, tmp_path):
+    outcome = run("compare", demo_run[1], two_level_run[1], "-o", tmp_path / "c", "--json")
+    content = json.loads(outcome.out)
+    assert content["outcomes"] == []
+    assert "two-level" in content["not_compared"]
+    assert not (tmp_path / "c" / "changes.csv").exists()
+    assert content["not_compared"] in Elements((tmp_path / "c" / "compare.html").read_text(encoding="utf-8")).text
+
+
+def test_python_compares_what_the_command_does(sessions):
+    with pytest.raises(KinertiaError, match="two sessions, or two conditions"):
+        kinertia.compare(sessions[0])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "DRAWS", 2)
+        found = kinertia.compare(*sessions, conditions=("before", "after"))
+    assert len(found.outcomes) > 50
+    assert found.speed.difference == pytest.approx(0.0, abs=1e-9)

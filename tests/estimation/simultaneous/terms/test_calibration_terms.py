@@ -1,0 +1,55 @@
+import numpy as np
+import pytest
+
+from kinertia.estimation.simultaneous.terms.calibration_terms import Displaced, as_displaced
+
+PLACES = slice(4, 10)
+SIZE = 10
+
+
+@pytest.fixture
+def terms():
+    """Information and right-hand side of a trial, that of everything else, and deviations, two of them zero."""
+    rng = np.random.default_rng(0)
+    rows = rng.normal(size=(30, SIZE))
+    elsewhere = np.diag(rng.uniform(1.0, 3.0, SIZE))
+    return rows.T @ rows, rng.normal(size=SIZE), elsewhere, np.array([0.5, 1.0, 0.0, 0.0, 2.0, 0.3]), rng.normal(size=6)
+
+
+def together(information, rhs, elsewhere, sd, own):
+    """Normal equations on static unknowns and displacements (in prior deviations), from x in the trial = s + sd u."""
+    chain = np.hstack([np.eye(SIZE), np.zeros((SIZE, 6))])
+    chain[PLACES, SIZE:] = np.diag(sd)
+    whole = chain.T @ information @ chain
+    whole[:SIZE, :SIZE] += elsewhere
+    whole[SIZE:, SIZE:] += np.eye(6)
+    return whole, chain.T @ rhs - np.concatenate([np.zeros(SIZE), own]), chain
+
+
+def test_eliminated_is_what_the_whole_system_gives(terms):
+    information, rhs, elsewhere, sd, own = terms
+    whole, both, _ = together(information, rhs, elsewhere, sd, own)
+    expected = np.linalg.solve(whole, both)
+    displaced = Displaced.of(information, PLACES, sd)
+    on_displacements = sd * rhs[PLACES] - own
+    step = np.linalg.solve(displaced.information + elsewhere, rhs - on_displacements @ displaced.gain)
+    np.testing.assert_allclose(step, expected[:SIZE], rtol=1e-10)
+    found = displaced.rest(on_displacements) - displaced.gain @ step
+    np.testing.assert_allclose(found, expected[SIZE:], rtol=1e-10)
+    np.testing.assert_allclose(np.linalg.inv(displaced.information + elsewhere), np.linalg.inv(whole)[:SIZE, :SIZE])
+
+
+def test_in_the_trial_unknowns_are_known_as_the_whole_system_says(terms):
+    information, rhs, elsewhere, sd, own = terms
+    whole, _, chain = together(information, rhs, elsewhere, sd, own)
+    expected = chain @ np.linalg.inv(whole) @ chain.T
+    in_trial = information + as_displaced(elsewhere, PLACES, sd)
+    np.testing.assert_allclose(np.linalg.inv(in_trial), expected, rtol=1e-9, atol=1e-12)
+
+
+def test_without_deviation_there_are_no_displacements(terms):
+    information, *_ = terms
+    displaced = Displaced.of(information, PLACES, np.zeros(6))
+    np.testing.assert_array_equal(displaced.information, information)
+    assert not displaced.gain.any()
+    assert not displaced.rest(np.ones(6)).any()

@@ -1,0 +1,101 @@
+"""What coordinates pay beyond their ranges, and an estimate that stays within them."""
+
+import numpy as np
+import pytest
+
+from kinertia.estimation.simultaneous.linear_algebra.frame_blocks import TimeBlock, time_blocks
+from kinertia.estimation.simultaneous.linear_algebra.motion_basis import MotionBasis
+from kinertia.estimation.simultaneous.linear_algebra.normal_equations import NormalEquations
+from kinertia.estimation.simultaneous.terms.motion_terms import RangeTerms, add_ranges, add_start
+from kinertia.model.coordinate_range import CLAMPED_SD, SD, Bounds, Range
+from validation.study_bound import dense_band
+
+RANGES = {"elbow": Range(0.0, 2.6, clamped=True), "shoulder": Range(-1.0, 1.0, clamped=False)}
+
+
+BOUNDS = Bounds.of(("elbow", "shoulder", "root"), RANGES)
+
+
+def total(q: np.ndarray) -> float:
+    """What these coordinates pay, frames worth one knot interval each."""
+    return RangeTerms.of(BOUNDS, q, 1.0).cost
+
+
+def test_within_nothing_is_paid_and_beyond_one_deviation_is_a_half():
+    assert total(np.array([[1.0, 0.5, 1e9], [0.05, -0.95, -1e9]])) == 0.0
+    assert total(np.array([[1.0, 1.0 + SD, 0.0]])) == pytest.approx(0.5)
+    # the end is rounded off over half of this deviation
+    assert total(np.array([[-10.0 * CLAMPED_SD, 0.0, 0.0]])) == pytest.approx(50.0)
+    assert total(np.array([[-CLAMPED_SD, 0.0, 0.0]])) == pytest.approx(0.5 * (0.5 * np.log1p(np.exp(2.0))) ** 2)
+
+
+def test_cost_and_curvature_have_no_corner_at_an_end():
+    q = np.array([[2.6 + x, 0.0, 0.0] for x in np.linspace(-0.05, 0.05, 2001)])
+    terms = RangeTerms.of(BOUNDS, q, 1.0)
+    curvature = terms.curvature[:, 0]
+    slopes = -np.gradient(terms.pull[:, 0], q[:, 0])
+    np.testing.assert_allclose(slopes[2:-2], curvature[2:-2], atol=5e-3 / CLAMPED_SD**2)
+    assert np.abs(np.diff(curvature)).max() < 0.01 / CLAMPED_SD**2
+
+
+def test_derivatives_are_those_of_the_cost():
+    rng = np.random.default_rng(0)
+    basis = MotionBasis(np.linspace(0.0, 1.0, 61), 0.1)
+    coefficients = rng.normal(0.0, 2.0, (basis.size, 3))
+
+    def normal_at(coefficients: np.ndarray, time_block: TimeBlock) -> NormalEquations:
+        normal = NormalEquations.zero(time_block.size, 3, 1)
+        add_ranges(normal, basis, time_block, BOUNDS, basis.evaluate(coefficients, time_block.frames)[0])
+        return normal
+
+    whole = normal_at(coefficients, TimeBlock.whole(basis))
+    assert whole.cost > 1.0
+    step = 1e-7
+    for i, j in ((0, 0), (4, 1), (7, 0), (basis.size - 1, 1), (3, 2)):
+        there, back = coefficients.copy(), coefficients.copy()
+        there[i, j] += step
+        back[i, j] -= step
+        two = [normal_at(one, TimeBlock.whole(basis)) for one in (there, back)]
+        slope = (two[0].cost - two[1].cost) / (2 * step)
+        assert slope == pytest.approx(-whole.rhs[i, j], rel=1e-5, abs=1e-3)
+        bends = -(two[0].rhs - two[1].rhs)[i : i + 6] / (2 * step)
+        np.testing.assert_allclose(bends[:, j], whole.band[i, : len(bends), j, j], rtol=1e-4, atol=1e-3)
+    parts = time_blocks(basis, 6)
+    assert len(parts) > 1
+    assert sum(normal_at(coefficients, part).cost for part in parts) == pytest.approx(whole.cost)
+
+
+def terms(moved: np.ndarray) -> NormalEquations:
+    """Of a trial of so many splines in one block."""
+    size, c = moved.shape
+    basis = MotionBasis(np.linspace(0.0, 0.05 * (size - 5), 2 * size), 0.05)
+    normal = NormalEquations.zero(size, c, 1)
+    add_start(normal, TimeBlock.whole(basis), moved)
+    return normal
+
+
+def test_a_constant_offset_is_free_however_long_the_trial():
+    """Ten minutes must not know an angle that markers in wrong places show wrongly: by 0.1 rad, which is much."""
+    offset = np.full((12_000, 2), 0.1)
+    normal = terms(offset)
+    assert normal.cost < 0.2
+    assert np.abs(normal.rhs).max() < 2e-4
+
+
+def test_what_nothing_shows_goes_where_its_neighbours_go():
+    """A gap of ten splines between two that are known."""
+    normal = terms(np.zeros((12, 1)))
+    matrix = dense_band(normal.band)
+    matrix[[0, -1], [0, -1]] += 1e6
+    filled = np.linalg.solve(matrix, 1e6 * np.eye(12)[0] * 0.2 + 1e6 * np.eye(12)[-1] * 0.3)
+    np.testing.assert_allclose(filled, np.linspace(0.2, 0.3, 12), atol=0.005)
+
+
+def test_terms_are_those_of_their_cost():
+    rng = np.random.default_rng(0)
+    moved, step = rng.normal(size=(2, 9, 3))
+    normal = terms(moved)
+    ahead, behind = (terms(moved + sign * step) for sign in (1.0, -1.0))
+    assert (behind.cost - ahead.cost) / 2.0 == pytest.approx((normal.rhs * step).sum())
+    bent = step.ravel() @ dense_band(normal.band) @ step.ravel()
+    assert ahead.cost + behind.cost - 2.0 * normal.cost == pytest.approx(bent)

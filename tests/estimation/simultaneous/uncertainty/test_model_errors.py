@@ -1,0 +1,169 @@
+"""The effect of a displaced knee, against loads about it in the axes that it defines."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from kinertia.estimation.simultaneous.uncertainty.model_errors import (
+    AXIS_SD_RAD,
+    CENTRE_SD_M,
+    GROWTH,
+    LASTS_S,
+    block_growth,
+    knee_geometry,
+    with_drawn_knees,
+)
+from kinertia.motion.dynamics import Motion
+from kinertia.motion.joint_moments import body_joints, component_signs, joint_axes, joint_moments, joint_wrenches
+from kinertia.synthetic.walk import walk, walking_subject
+
+SMALL = 1e-3
+"""Of the displacement's standard deviations."""
+
+
+@pytest.fixture(scope="module")
+def standing():
+    """Skeleton, joints and their loads: upright, where axes are perpendicular to each other."""
+    walked = walk(walking_subject(), 1.0, 100.0)
+    n, c = 4, len(walked.skeleton.coordinates)
+    still = Motion(*np.zeros((3, n, c)))
+    loads = np.random.default_rng(0).normal(0.0, 1.0, (n, 2, 6)) * [100.0, 700.0, 100.0, 50.0, 20.0, 50.0]
+    joints = body_joints(walked.skeleton)
+    own = joint_moments(walked.skeleton, walked.bsp, still, loads)
+    wrenches = joint_wrenches(walked.skeleton, walked.bsp, still, loads, joints)
+    return walked.skeleton, joints, own, wrenches
+
+
+def unit(vector):
+    return vector / np.linalg.norm(vector)
+
+
+def frame(up, right):
+    """(3, 3) axes forward, up and right in columns, of which `up` is exact."""
+    up, right = unit(up), unit(right - (right @ unit(up)) * unit(up))
+    return np.column_stack([np.cross(up, right), up, right])
+
+
+def displaced(skeleton, joints, wrenches, centre_m, axis_rad):
+    """(n, j, 2, 3) moments and forces where the knees are displaced to the right and turned about the thigh."""
+    pose = skeleton.pose(np.zeros((1, len(skeleton.coordinates))))
+    turned = {name: pose.rotation[0, k] for k, name in enumerate(skeleton.segments)}
+    centres = {joint.label: joint.centre(skeleton, pose)[0] for joint in joints}
+    places, result = dict(centres), []
+    for joint in joints:
+        if joint.name == "Knee":
+            thigh = turned[joint.parent]
+            places[joint.label] = centres[joint.label] + centre_m * thigh[:, 2]
+    for joint in joints:
+        if joint.side:
+            hip, knee, ankle = (places[f"{name}_{joint.side}"] for name in ("hip", "knee", "ankle"))
+            thigh_name = next(one.child for one in joints if (one.name, one.side) == ("Hip", joint.side))
+            shank_name = next(one.child for one in joints if (one.name, one.side) == ("Knee", joint.side))
+            thigh, shank = turned[thigh_name], turned[shank_name]
+            right = np.cos(axis_rad) * thigh[:, 2] + np.sin(axis_rad) * thigh[:, 0]
+            own = turned | {thigh_name: frame(hip - knee, right), shank_name: frame(knee - ankle, shank[:, 2])}
+        else:
+            own = turned
+        wrench = wrenches[joint]
+        moved = wrench[:, 3:] + np.cross(centres[joint.label] - places[joint.label], wrench[:, :3])
+        axes = joint_axes(own[joint.parent][None], own[joint.child][None], long_axis=joint.long_axis)[0]
+        moments = component_signs(joint) * (moved @ axes.T)
+        result.append(np.stack([moments, wrench[:, :3] @ own[joint.child]], axis=1))
+    return np.stack(result, axis=1)
+
+
+class Drawn:
+    """Displacements in place of random ones, the same for both knees."""
+
+    def __init__(self, centre, axis):
+        self.scale = np.array([centre, axis])
+
+    def normal(self, mean, sd):
+        return mean + self.scale * np.asarray(sd)
+
+
+@pytest.mark.parametrize("scale", [(SMALL, 0.0), (0.0, SMALL)])
+def test_moments_change_as_those_about_the_displaced_knee(standing, scale):
+    skeleton, joints, own, wrenches = standing
+    before, after = (
+        displaced(skeleton, joints, wrenches, s[0] * CENTRE_SD_M, s[1] * AXIS_SD_RAD) for s in ((0.0, 0.0), scale)
+    )
+    drawn = with_drawn_knees(skeleton, joints, own, Drawn(*scale))
+    found = np.stack([drawn.moments - own.moments, drawn.forces - own.forces], axis=2)
+    expected = after - before
+    size = np.abs(expected).max(axis=(0, 1, 3))
+    assert size.min() > 0.0
+    for k, joint in enumerate(joints):
+        near = 0.15 if joint.name == "Ankle" else 0.02  # a foot points outward and down
+        for part in range(2):
+            np.testing.assert_allclose(found[:, k, part], expected[:, k, part], atol=near * size[part])
+
+
+def test_variances_are_those_of_the_displacements(standing):
+    skeleton, joints, own, _ = standing
+    signs = np.array([component_signs(joint) for joint in joints])
+    both = np.stack([signs * own.moments, own.forces], axis=2)
+    found = knee_geometry(skeleton, joints, both.reshape(len(both), -1)).reshape(both.shape)
+    changes = [with_drawn_knees(skeleton, joints, own, Drawn(*scale)) for scale in np.eye(2)]
+    moments = sum(np.square(one.moments - own.moments) for one in changes)
+    forces = sum(np.square(one.forces - own.forces) for one in changes)
+    np.testing.assert_allclose(found, np.stack([moments, forces], axis=2), rtol=1e-9, atol=1e-12)
+    hip, knee = (next(k for k, joint in enumerate(joints) if joint.label == name) for name in ("hip_r", "knee_r"))
+    assert found[:, hip, 0, 2].min() > 0.0
+    np.testing.assert_allclose(
+        found[:, knee, 0, 1],
+        np.square(CENTRE_SD_M * own.forces[:, knee, 1]) + np.square(AXIS_SD_RAD * own.moments[:, knee, 0]),
+    )
+
+
+def test_back_is_as_certain_as_before(standing):
+    skeleton, joints, own, _ = standing
+    lumbar = [k for k, joint in enumerate(joints) if joint.name == "Lumbar"]
+    random = np.random.default_rng(1)
+    drawn = with_drawn_knees(skeleton, joints, own, random)
+    np.testing.assert_array_equal(drawn.moments[:, lumbar], own.moments[:, lumbar])
+    assert np.abs(drawn.moments - own.moments).max() > 0.1
+
+
+TIME = np.arange(200) / 100.0
+
+
+NAMES = ("pelvis_tilt", "hip_flexion_r", "knee_angle_r", "hip_flexion_l")
+
+
+def problem(loaded: np.ndarray, ground: np.ndarray | None = None) -> SimpleNamespace:
+    """As far as `block_growth` looks at it, with feet (n, 2) that are loaded, and on the ground beside plates."""
+    reactions = SimpleNamespace(loaded_at=lambda time: loaded[np.searchsorted(TIME, time - 1e-9)])
+    return SimpleNamespace(
+        trials=[SimpleNamespace(time=TIME, on_ground=ground)],
+        skeleton=SimpleNamespace(coordinates=NAMES),
+        loads=SimpleNamespace(reactions=lambda k, static: reactions),
+    )
+
+
+def test_of_the_leg_that_has_landed_and_for_a_while():
+    loaded = np.ones((200, 2))
+    loaded[50:100, 0] = 0.0
+    between = TIME + 0.005
+    growth = block_growth(problem(loaded), 0, np.zeros(0), between)
+    landed = (between > 1.0) & (between < 1.0 + LASTS_S)
+    np.testing.assert_array_equal(growth[:, 1], np.where(landed, GROWTH, 1.0))
+    assert (growth[:, [0, 2, 3]] == 1.0).all()
+
+
+def test_also_beside_the_plates_and_in_the_joint_of_the_hip():
+    ground = np.ones((200, 2), dtype=bool)
+    ground[50:100, 1] = False
+    hips = [SimpleNamespace(label=f"hip_{side}") for side in "rl"]
+    growth = block_growth(problem(np.zeros((200, 2)), ground), 0, np.zeros(0), TIME, hips)
+    landed = (TIME > 0.995) & (TIME < 1.0 + LASTS_S)
+    for column in (3, 10):  # the coordinate, and the first of six components of the left hip
+        np.testing.assert_array_equal(growth[:, column], np.where(landed, GROWTH, 1.0))
+    assert growth.shape == (200, 16)
+    assert (np.delete(growth, [3, 10], axis=1) == 1.0).all()
+
+
+@pytest.mark.parametrize("weight", [0.0, 1.0])
+def test_nobody_lands_who_stands_or_flies(weight):
+    assert (block_growth(problem(np.full((200, 2), weight)), 0, np.zeros(0), TIME) == 1.0).all()
