@@ -2,7 +2,7 @@
 
 In some laboratories, all files have the wrong sign of the vertical moments: the free moments are then wrong by twice
 their own size. The estimates with either sign show which is likelier, for all trials of a person together
-(`simultaneous.model_evidence`). For 28 measured trials from eight laboratories the log odds of the opposite sign are
+(`uncertainty.evidence`). For 28 measured trials from eight laboratories the log odds of the opposite sign are
 between -50 and -2.6 where the sign is right. Where it is wrong, they are 12 to 59 in walks and squats; in drop jumps,
 which contain little information, 1 and 5.
 

@@ -36,8 +36,8 @@ class MarkerSetDraft:
         text: TOML; what is unknown, and why, is in comments.
         needed: landmarks that were not found, and without which no leg can be modelled.
         notes: remarks to read before using it.
-        against: why it cannot be right: axes of its legs that no person has (`leg_axes`). Such a draft is not used
-            unless the user asks for it.
+        against: why it cannot be right: axes of its legs that no person has (`static_landmarks`). Such a draft is not
+            used unless the user asks for it.
     """
 
     text: str

@@ -5,7 +5,7 @@ once, and joints beyond their ranges are penalised (`pose_fit`). Several poses m
 several sets of angles describe the same pose: an arm rotated by half a turn with the elbow bent backwards, a foot
 upside down. So frames a tenth of a second apart are solved first; among equally good poses each takes the one that
 continues its neighbour's, outwards from the frame that fits best, and among equivalent angles those that do not jump
-(`angle_continuity`). All other frames start from there.
+(`pose_fit`). All other frames start from there.
 
 Model and markers differ by millimetres to centimetres (skin, marker placement), so a pose that is fitted to fewer
 markers differs: where a marker vanishes for a frame, the joint jumps, and accelerations at the edges of the gap are

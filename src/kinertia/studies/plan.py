@@ -3,7 +3,7 @@
 Candidates are measured trials of a person, or the package's motions of its synthetic person, with skin motion of
 published size in the walk and up to twice that in the others. Nothing is estimated: standard deviations follow from the
 information of each trial at the literature's parameters (`predicted.Information`), which is summed over several trials,
-except for errors that recur (`error_repetition`).
+except for errors that recur (`marker_noise`).
 
 The information of the simultaneous estimate (`simultaneous`) depends on the data only through the point at which it is
 evaluated. At the literature's parameters it predicts what a recording will determine; at the truth it is the Cramér-Rao
@@ -52,7 +52,7 @@ class Information:
     Attributes:
         problem: the estimate at whose start it is evaluated: the observations' coordinates, the prior's mean. It holds
             each trial's own observations (`observation.Observations`): repeats are counted here.
-        repeats: (t, t) how often the errors of each trial recur in each (`error_repetition.repeats`).
+        repeats: (t, t) how often the errors of each trial recur in each (`marker_noise.repeats`).
     """
 
     problem: MapProblem

@@ -3,7 +3,7 @@
 A static trial shows where markers are on a standing person, often with raised arms; in gait the skin has moved (the
 acromia by up to 10 cm after a T-pose). Over a few frames of the trials, coordinates that move (one set per frame) and
 calibration that does not (marker positions, and locked coordinates such as the shoulder centre) are estimated together
-by Gauss-Newton; the static trial is the prior, and a coordinate beyond its range is penalised (`range_terms`). Frames
+by Gauss-Newton; the static trial is the prior, and a coordinate beyond its range is penalised (`motion_terms`). Frames
 are eliminated one by one (Schur complement), so the cost grows linearly with their number.
 """
 

@@ -112,7 +112,7 @@ class Prepared:
         left_out: names of the trials that could not be used.
         rules: number of rules checked so far.
         elbow_rotations_rad: side ("r", "l") -> rotation of the static trial's elbow axis by the trials
-            (`joint_adaptation.elbow_rotations`).
+            (`model_adaptation.elbow_rotations`).
         torso_rotation_rad: rotation of the torso under its markers that calibration would have made and that was
             prevented; None if there was none.
 

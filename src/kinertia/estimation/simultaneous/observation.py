@@ -157,7 +157,7 @@ class Observations:
         noise: per trial.
         misplaced_m: (m,) standard deviation of the markers' mean positions in their segments, over the trials, from the
             skeleton's.
-        repeats: (t, t) how often the errors of each trial recur in each (`error_repetition.repeats`).
+        repeats: (t, t) how often the errors of each trial recur in each (`marker_noise.repeats`).
     """
 
     separate: tuple[Observation, ...]

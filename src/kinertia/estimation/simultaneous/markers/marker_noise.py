@@ -193,7 +193,7 @@ class MarkerNoise:
         sd_m: per label, standard deviation of one coordinate in one frame, m, without the part that follows the joints.
         correlation_s: time over which errors are correlated.
         drifting: labels whose standard deviation is more than three times the usual; they drift and are down-weighted.
-        repeats: number of strides in all trials together in which errors recur (`error_repetition`); 1: never.
+        repeats: number of strides in all trials together in which errors recur (`marker_noise`); 1: never.
         displacement_sd_m: per label, standard deviation of its displacement in this trial (`displacement`), m; 0 for
             one trial.
     """

@@ -2,10 +2,10 @@
 
 They combine the uncertainty of motion, body segment parameters and calibration by the delta method: analytic
 derivatives by spline coefficients and static unknowns, times their posterior covariance. Errors that recur in every
-stride (`error_repetition`) do not make the motion less certain, only what many frames show of static unknowns: the
+stride (`marker_noise`) do not make the motion less certain, only what many frames show of static unknowns: the
 residual uncertainty of the motion, given these, is due to the errors alone. It comes from the covariance of the
-coefficients (`motion_spread`), and is scaled by the observed size of the errors (`motion_noise`), in moments by more
-where skin motion is not observable (`skin_blocks`). The delay of the forces counts with its whole distribution
+coefficients (`curve_variances`), and is scaled by the observed size of the errors (`motion_noise`), in moments by more
+where skin motion is not observable (`model_errors`). The delay of the forces counts with its whole distribution
 (`delayed_loads`): at foot contact they change within less than its uncertainty. The part of the forces that is faster
 than the motion (`GroundReactions.impact`) is added as a moving mean square: whether it acts on the joints or
 decelerates segments is unknown.
@@ -108,7 +108,7 @@ def curve_deviations(
         coefficients, static: the estimate.
         eliminated: the trial's normal equations there, undamped.
         root: (S, S + u) root of the posterior covariance of the static unknowns: u columns of their own
-            (`omitted_unknowns`), then those of `StaticInformation`, of which the rows of unknowns in the root
+            (`delay_profile`), then those of `StaticInformation`, of which the rows of unknowns in the root
             equations, which come first, have only as many nonzero columns as there are such unknowns.
         noise: (3,) `motion_noise`, of errors that do not recur.
     """
@@ -145,7 +145,7 @@ class _Curves:
         coefficients: as in `curve_deviations`.
         shares: as in `_Seen`.
         frames: (d,) indices of the reported frames.
-        grown: (d, r) factors on the corresponding standard deviations of the moments (`skin_blocks.block_growth`).
+        grown: (d, r) factors on the corresponding standard deviations of the moments (`model_errors.block_growth`).
         variance: of the curves.
         impact: (d, r) as in `MomentDerivatives`.
         speed: (d, c) of the coordinates.

@@ -1,7 +1,7 @@
 """Computes joint moments, and the derivatives of moments and ground reactions by all unknowns.
 
 Besides the generalised forces these are the three-dimensional moments and forces of `body_joints`, which virtual axes
-give (`joint_wrench`), projected on the axes of the joint coordinate system (`joint_rows`).
+give (`joint_moments`), projected on the axes of the joint coordinate system (`joint_rows`).
 
 At foot contact and foot off, forces change within a shorter time, and a time derivative does not describe the effect of
 a delay. It is replaced by the regression of the loads on the delay, over all likely delays (statistical linearisation),

@@ -5,7 +5,7 @@ through the border of the normal equations, and differs from it by what the mark
 `Eliminated.motion_step` does both at once. The motion's own part is then reduced according to the observed marker
 errors, as `curve_deviations` reduces its derivatives (`motion_noise`): by a filter, since positions, rates and
 accelerations each have a share of their own and a draw is one motion. Knot positions (`knot_phases`), thigh masses in
-other tasks (`task_masses`) and impact transients each add an independent number.
+other tasks (`bsp_term`) and impact transients each add an independent number.
 
 Draws are made once, with a fixed seed, and stored with the result: a few hundred take less memory than the factors from
 which more could be made.
