@@ -240,7 +240,7 @@ def corrections(fit: Fit) -> str:
         if one.sd and abs(one.value) > _CLEAR_SD * one.sd:
             if one.quantity == GAIN:
                 found.append(f"{one.plate} {100.0 * one.value:+.1f} %")
-            elif one.quantity == DELAY:
+            elif one.quantity == DELAY and one.trial is not None:  # the clock's own part is in it
                 found.append(f"delay {1e3 * one.value:.1f} ms")
     return ", ".join(dict.fromkeys(found))
 
