@@ -19,6 +19,7 @@ from kinertia.estimation.simultaneous.calibration_entry import GAIN
 from kinertia.estimation.simultaneous.fit import Posterior, SimultaneousFit, fit_simultaneous
 from kinertia.estimation.simultaneous.instruments.priors import ModelUncertainty
 from kinertia.estimation.simultaneous.linear_algebra.motion_basis import Bandwidth
+from kinertia.estimation.simultaneous.terms.cost_term import CostTerm
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
 from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level, intervals
 from kinertia.model.bsp import BodySegmentParameters
@@ -52,6 +53,7 @@ def estimate_bsp(
     attached: Sequence[Attached] = (),
     overrule: Overrule | None = None,
     calibrate: bool = False,
+    terms: Sequence[type[CostTerm]] = (),
 ) -> Fit:
     """Estimate a person's body segment parameters from one or more trials, with the built-in model or the user's own.
 
@@ -68,29 +70,38 @@ def estimate_bsp(
         attached: what the person wore or carried in all trials.
         overrule: findings that do not block, or are not shown.
         calibrate: let markers and joint centres of an OpenSim model move; else they are fixed.
+        terms: as in `fit_subject`.
 
     Raises:
         KinertiaError: the subject, a marker set, the model or a trial cannot be used; the message states why and what
             to do.
     """
     ready = prepare(subject, source, inputs, settings, marker_set, progress, attached, overrule, calibrate)
-    return estimate(ready if prior is None else replace(ready, prior=prior), progress)
+    return estimate(ready if prior is None else replace(ready, prior=prior), progress, terms)
 
 
 @one_blas_thread
-def estimate(ready: Prepared, progress: Progress = lambda stage, share: None) -> Fit:
+def estimate(
+    ready: Prepared, progress: Progress = lambda stage, share: None, terms: Sequence[type[CostTerm]] = ()
+) -> Fit:
     """Estimate the parameters of a prepared person: the last step of `estimate_bsp`, with the settings of the others.
 
     Args:
         ready: as `prepare` makes it.
         progress: called as the work goes on.
+        terms: as in `fit_subject`.
 
     Raises:
         KinertiaError: the trials contradict each other, or the scale.
     """
     settings, ready = ready.settings, with_attached(ready)
-    estimator = _two_level if settings.method == "two-level" else _simultaneous
-    outcome = estimator(ready, settings, time.perf_counter(), progress)
+    started = time.perf_counter()
+    if settings.method == "two-level":
+        if terms:
+            raise SettingsError.of_entry("method", 'expected "simultaneous": only this estimate has cost terms')
+        outcome = _two_level(ready, settings, started, progress)
+    else:
+        outcome = _simultaneous(ready, settings, started, progress, terms)
     fit = Fit(
         subject=ready.subject,
         settings=settings,
@@ -153,7 +164,9 @@ def named_by_source(ready: Prepared) -> ModelUncertainty:
     return replace(ready.uncertainty, source="the prior") if known else ready.uncertainty
 
 
-def _simultaneous(ready: Prepared, settings: Settings, started: float, progress: Progress) -> _Outcome:
+def _simultaneous(
+    ready: Prepared, settings: Settings, started: float, progress: Progress, terms: Sequence[type[CostTerm]]
+) -> _Outcome:
     progress("estimate", 0.0)
     bandwidths = Bandwidth.of(ready.kinematics, settings.cutoff_hz, settings.force_cutoff_hz)
 
@@ -167,6 +180,7 @@ def _simultaneous(ready: Prepared, settings: Settings, started: float, progress:
             lambda share: progress("estimate", share),
             otherwise,
             one.functional,
+            terms,
         )
 
     signed = with_likelier_sign(ready, fit)

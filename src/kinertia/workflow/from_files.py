@@ -6,6 +6,7 @@ trial.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,6 +28,7 @@ from kinertia.workflow.screening import screen
 
 if TYPE_CHECKING:
     from kinertia.estimation.learnt_prior import LearntPrior
+    from kinertia.estimation.simultaneous.terms.cost_term import CostTerm
     from kinertia.io.subject.body_files import BodyMeasures
     from kinertia.io.subject.learnt_files import PersonInstruments
 
@@ -145,6 +147,7 @@ def fit_subject(
     subject: str | Path | SubjectFile,
     progress: Progress = lambda stage, share: None,
     overrule: Overrule | None = None,
+    terms: Sequence[type[CostTerm]] = (),
 ) -> Fit:
     """Estimate body segment parameters of the person in a subject file: what `kinertia fit` does, in one call.
 
@@ -152,9 +155,11 @@ def fit_subject(
         subject: the file, or the result of `read_subject`.
         progress: called as the work progresses, with a stage's name and the share of it that is done.
         overrule: what is overruled besides what the subject file says.
+        terms: cost terms of your own, besides those of the simultaneous estimate, in any order: classes like the
+            example under "Cost terms" on the page about the architecture.
 
     Raises:
         KinertiaError: a file is missing or broken, or something in it cannot be used.
     """
     wanted = subject if isinstance(subject, SubjectFile) else read_subject(subject)
-    return estimate(prepare_subject(wanted, progress, overrule), progress)
+    return estimate(prepare_subject(wanted, progress, overrule), progress, terms)

@@ -132,7 +132,7 @@ def fit_simultaneous(
     progress: Callable[[float], None] = lambda share: None,
     otherwise: Sequence[Kinematics] = (),
     functional: Sequence[Kinematics] = (),
-    terms: Sequence[type[CostTerm]] = TERMS,
+    terms: Sequence[type[CostTerm]] = (),
 ) -> SimultaneousFit:
     """Estimate motion, BSPs and calibration of all trials together.
 
@@ -146,7 +146,7 @@ def fit_simultaneous(
         otherwise: the same trials with other ground reactions, whose evidence is computed for comparison
             (`SimultaneousResult.evidence`).
         functional: kinematics of trials whose markers alone are used; they are not in the result.
-        terms: of the cost.
+        terms: of the cost, besides `TERMS`.
     """
     every = [*trials, *functional]
     used = used_skeleton(skeleton, every, uncertainty)
@@ -157,7 +157,7 @@ def fit_simultaneous(
     count = len(trials)
     others = [reading(*each) for each in zip(pooled[:count], otherwise, bandwidths, strict=True)] if otherwise else []
     others += pooled[count:] if otherwise else ()
-    result = estimate_simultaneous(used, prior, calibration, pooled, progress, others, terms).of_first(count)
+    result = estimate_simultaneous(used, prior, calibration, pooled, progress, others, (*TERMS, *terms)).of_first(count)
     staying = uncertainty.marker_sd_m is None
     calibrated = result.skeleton.carrying(None)
     calibrated = calibrated.with_markers(used.markers) if staying else calibrated

@@ -12,6 +12,9 @@ from kinertia.estimation.simultaneous.observation import CalibrationPrior, Obser
 from kinertia.estimation.simultaneous.search.linearised import Point
 from kinertia.estimation.simultaneous.search.problem import MapProblem
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
+from kinertia.estimation.simultaneous.terms.all_terms import TERMS
+from kinertia.estimation.simultaneous.terms.cost_term import in_order
+from kinertia.estimation.simultaneous.terms.instrument_term import InstrumentErrors
 from kinertia.motion.smoothing import smooth
 from kinertia.synthetic.walk import unlike_literature, walk, walking_subject
 from small_problem import one_plate_per_foot, point, small_problem
@@ -62,7 +65,7 @@ def observation(trial, bias_nm: float) -> Observation:
 def found(page, person, trial, bias_nm: float):
     calibration = CalibrationPrior({}, np.full(len(trial.skeleton.markers), 0.005), InstrumentPrior())
     prior, trials = literature_prior(person.literature), [observation(trial, bias_nm)]
-    result = estimate_simultaneous(trial.skeleton, prior, calibration, trials, terms=page["MORE_TERMS"])
+    result = estimate_simultaneous(trial.skeleton, prior, calibration, trials, terms=(*TERMS, page["MomentBias"]))
     return {one.plate: one for one in result.calibration if one.quantity == page["BIAS"]}
 
 
@@ -79,7 +82,9 @@ def test_a_simulated_bias_comes_back(page, person, trial, bias_nm):
 def test_its_derivatives_are_those_of_the_cost(page):
     """And so are those of the terms after it, which see what it leaves of the loads."""
     small = small_problem()
-    problem = MapProblem(small.skeleton, small.prior, small.calibration, small.trials, terms=page["MORE_TERMS"])
+    problem = MapProblem(
+        small.skeleton, small.prior, small.calibration, small.trials, terms=(*TERMS, page["MomentBias"])
+    )
     (coefficients,), static = point(problem)
     static[problem.layout[page["BIAS"]]] = [3.0, -2.0, 1.0]
     here = Point((coefficients,), static, problem.beginning.displaced)
@@ -94,11 +99,20 @@ def test_its_derivatives_are_those_of_the_cost(page):
 
 def test_it_costs_nothing_where_there_is_no_bias(page):
     small = small_problem()
-    with_bias = MapProblem(small.skeleton, small.prior, small.calibration, small.trials, terms=page["MORE_TERMS"])
+    with_bias = MapProblem(
+        small.skeleton, small.prior, small.calibration, small.trials, terms=(*TERMS, page["MomentBias"])
+    )
     again = with_bias.of(small.trials)
-    assert [type(term) for term in again.terms] == list(page["MORE_TERMS"])
+    kinds = [type(term) for term in with_bias.terms]
+    assert [type(term) for term in again.terms] == kinds
+    assert kinds.index(page["MomentBias"]) < kinds.index(InstrumentErrors), "although listed last"
     assert small.layout.laboratory.stop - small.layout.laboratory.start == (
         with_bias.layout.laboratory.stop - with_bias.layout.laboratory.start
     )
     cost = small.slope(small.beginning).cost
     assert with_bias.slope(with_bias.beginning).cost == pytest.approx(cost, rel=1e-12)
+
+
+def test_every_term_states_its_place_and_the_list_is_in_this_order(page):
+    assert in_order(TERMS) == TERMS
+    assert in_order((page["MomentBias"], *TERMS)) == in_order((*TERMS, page["MomentBias"]))

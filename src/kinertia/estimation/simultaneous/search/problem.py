@@ -24,7 +24,7 @@ from kinertia.estimation.simultaneous.linear_algebra.normal_equations import Equ
 from kinertia.estimation.simultaneous.observation import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.search.linearised import Linearised, Point, Slope
 from kinertia.estimation.simultaneous.terms.all_terms import TERMS
-from kinertia.estimation.simultaneous.terms.cost_term import CostTerm, GroundLoads, InTrial, Solution
+from kinertia.estimation.simultaneous.terms.cost_term import CostTerm, GroundLoads, InTrial, Solution, in_order
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.workload import side_by_side
 
@@ -58,9 +58,10 @@ class MapProblem:
         self.skeleton, self.prior, self.calibration, self.trials = skeleton, prior, calibration, trials
         self.given = Given(skeleton, prior, calibration, trials, phase)
         self.bases, self.start, self.moving = self.given.bases, self.given.start, self.given.moving
-        self.layout = Layout.of(one for term in terms for one in term.unknowns(self.given))
+        kinds = in_order(terms)
+        self.layout = Layout.of(one for term in kinds for one in term.unknowns(self.given))
         self.model = FreedModel(self.given, self.layout)
-        self.terms = tuple(term(self.model) for term in terms)
+        self.terms = tuple(term(self.model) for term in kinds)
         self.loads = GroundLoads(self.given, self.terms)
         self.time_blocks = time_blocks_of_trials(self.bases, len(self.moving), self.layout.size)
         self._adding = [term for term in self.terms if type(term).add is not CostTerm.add]

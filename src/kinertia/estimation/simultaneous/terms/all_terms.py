@@ -22,6 +22,6 @@ TERMS: tuple[type[CostTerm], ...] = (
     Start,
     RootLoads,
 )
-"""In the order in which their entries are shown. The last takes about as long as all others together, so that two
-threads can share the work of short trials.
+"""Sorted by their `order`. The last takes about as long as all others together, so that two threads can share the work
+of short trials.
 """

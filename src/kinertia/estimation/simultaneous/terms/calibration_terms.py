@@ -10,7 +10,7 @@ is the prior standard deviation, so that it may be zero.
 """
 
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
@@ -23,6 +23,8 @@ from kinertia.model.neutral_joints import joint_and_axis
 
 class MarkerPlaces(CostTerm):
     """Positions of the markers in their segments; with several trials each has displacements of its own."""
+
+    order: ClassVar[int] = 40
 
     @classmethod
     def unknowns(cls, given: Given) -> tuple[Unknowns, ...]:
@@ -48,6 +50,8 @@ class MarkerPlaces(CostTerm):
 
 class StaticCoordinates(CostTerm):
     """Coordinates of the skeleton that do not move in time."""
+
+    order: ClassVar[int] = 0
 
     @classmethod
     def unknowns(cls, given: Given) -> tuple[Unknowns, ...]:
@@ -82,6 +86,8 @@ class StaticCoordinates(CostTerm):
 
 class Skin(CostTerm):
     """Coefficients of skin motion (`skin`), the same in all trials."""
+
+    order: ClassVar[int] = 45
 
     @classmethod
     def unknowns(cls, given: Given) -> tuple[Unknowns, ...]:

@@ -1,13 +1,14 @@
 """Defines a cost term: the unknowns that it adds, its cost, and what it reads from the solution.
 
 `terms.TERMS` lists them. The estimate refers to no term by name; terms interact only through `FreedModel`, the
-unknowns' names in `Layout`, and the ground reactions (`GroundLoads`), which terms may change.
+unknowns' names in `Layout`, and the ground reactions (`GroundLoads`), which terms may change. Each states its place
+among the others (`CostTerm.order`): in which order they are listed does not matter.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -58,10 +59,14 @@ class CostTerm:
     """A term that adds no unknowns, costs nothing and reads nothing: each term overrides what it needs of these three.
 
     Attributes:
+        order: place among the terms, lowest first: of unknowns of one kind in the vector, of corrections of the loads,
+            and of entries that are shown. Terms of equal order stay as they are listed.
         given: input of the estimate.
         model: the model as a function of the unknowns.
         layout: positions of the unknowns in the vector.
     """
+
+    order: ClassVar[int] = 50
 
     @classmethod
     def unknowns(cls, given: Given) -> tuple[Unknowns, ...]:
@@ -111,8 +116,11 @@ class CostTerm:
 class LoadTerm(CostTerm):
     """A term whose unknowns are errors of the ground reactions.
 
-    Load terms correct the loads one after the other, in the order of the list.
+    Load terms correct the loads one after the other, by `order`: those of other packages before the plates' own errors,
+    which are of what is left.
     """
+
+    order: ClassVar[int] = 10
 
     def delay_unknowns(self, k: int) -> list[int]:
         """Return the indices of the unknowns whose sum is the delay of the forces of trial k."""
@@ -144,6 +152,11 @@ class LoadTerm(CostTerm):
     def add_by_unknowns(self, k: int, by_static: np.ndarray, by: np.ndarray) -> None:
         """Add such derivatives (n, r, ...) to those by all static unknowns (n, r, s)."""
         raise NotImplementedError
+
+
+def in_order(terms: Iterable[type[CostTerm]]) -> tuple[type[CostTerm], ...]:
+    """Sort terms by their `order`."""
+    return tuple(sorted(terms, key=lambda term: term.order))
 
 
 class GroundLoads:

@@ -12,7 +12,7 @@ unknowns for plates whose loads the prior calls incomplete; the loads on the fee
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -43,6 +43,8 @@ class InstrumentErrors(LoadTerm):
     the synchronisation delay, and so has a single trial whose synchronisation was not checked. Zero offsets
     (ZERO_UNKNOWNS) and gains belong to each trial's plates; the gains add to those of all trials.
     """
+
+    order: ClassVar[int] = 20
 
     @classmethod
     def unknowns(cls, given: Given) -> tuple[Unknowns, ...]:
@@ -271,6 +273,8 @@ def _of_contact(k: int, foot: int, plate: int, dynamic: np.ndarray, contact: np.
 
 class MissingLoads(CostTerm):
     """Loads that act on the body but not on plates with incomplete loads, as shares of what the plates measured."""
+
+    order: ClassVar[int] = 30
 
     @classmethod
     def unknowns(cls, given: Given) -> tuple[Unknowns, ...]:

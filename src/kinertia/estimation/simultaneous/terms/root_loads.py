@@ -11,7 +11,7 @@ specific force at the trunk (acceleration less gravity). It is taken from the gr
 """
 
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -39,6 +39,8 @@ _MOST_OF_TRUNK = 0.7
 
 class RootLoads(CostTerm):
     """The root equations at the dynamic frames of all trials; they add no unknowns, and depend on other terms'."""
+
+    order: ClassVar[int] = 100
 
     def __init__(self, model: FreedModel) -> None:
         super().__init__(model)
@@ -127,6 +129,8 @@ class BendingTrunk:
 
 class TrunkBending(CostTerm):
     """Bending of the trunk in each trial; without effect in models without a trunk."""
+
+    order: ClassVar[int] = 35
 
     @classmethod
     def unknowns(cls, given: Given) -> tuple[Unknowns, ...]:
