@@ -11,7 +11,7 @@ from pathlib import Path
 from unittest import mock
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 from threadpoolctl import threadpool_limits
 
 from command_line import Outcome, fitted, run
@@ -39,7 +39,7 @@ from validation.measured_data import data_folder, find
 from validation.walks import fit_arguments
 
 # no test judges time: machines are busy
-settings.register_profile("kinertia", deadline=None)
+settings.register_profile("kinertia", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("kinertia")
 
 # one BLAS thread, as long computations have it: here and, by the environment, in processes that tests start
