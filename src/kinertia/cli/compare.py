@@ -7,9 +7,6 @@ import typer
 
 from kinertia.cli.options import Outcome, Overwrite, Quiet, results_folder
 from kinertia.cli.terminal import out, shown_progress
-from kinertia.errors import KinertiaError
-from kinertia.estimation.changes.session_changes import why_incomparable
-from kinertia.estimation.prepare.prepared import Progress
 from kinertia.estimation.result.fit import Fit
 from kinertia.io.results.output_folder import complete_folder
 from kinertia.io.subject.provenance import names_from_common_folder
@@ -23,7 +20,7 @@ from kinertia.report.comparison.side_by_side import (
     remarks,
     render_comparison,
 )
-from kinertia.report.comparison.what_changed import Comparison, fit_of
+from kinertia.report.comparison.what_changed import Comparison, compared_sessions, fit_of
 from kinertia.report.comparison.what_changed import compare as compare_sessions
 from kinertia.report.exports.files import write_columns
 from kinertia.report.pages.file_outputs import outputs_sentence
@@ -37,6 +34,9 @@ def compare(
     conditions: Annotated[
         tuple[str, str] | None,
         typer.Option("--conditions", help="What changed from one condition to the other."),
+    ] = None,
+    norms: Annotated[
+        Path | None, typer.Option(help="File of kinertia norms: compares Gait Profile Scores as well.")
     ] = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the page and table.")] = Path("comparison"),
     overwrite: Overwrite = False,
@@ -54,7 +54,7 @@ def compare(
     kinertia compare subject.toml --conditions normal "toe out"
     """
     if conditions is not None and len(results) == 1:
-        return _compare_conditions(results[0], conditions, output, overwrite)
+        return _compare_conditions(results[0], conditions, norms, output, overwrite)
     if conditions is not None and len(results) > 2:
         raise typer.BadParameter("with --conditions, give one session, or two")
     if not 2 <= len(results) <= MOST_FITS:
@@ -66,7 +66,7 @@ def compare(
     names = names_from_common_folder(paths)
     with shown_progress() as progress:
         fits = {name: fit_of(path, progress) for name, path in zip(names, paths, strict=True)}
-        found, reason = _sessions(list(fits.values()), conditions, progress)
+        found, reason = compared_sessions(list(fits.values()), conditions, progress, norms)
     page = render_comparison(fits, None if found is None else found.shown(), reason)
     with complete_folder(output, "compare") as work:
         (work / "compare.html").write_text(page, encoding="utf-8")
@@ -81,21 +81,6 @@ def compare(
     out.print(f"comparison in {output / 'compare.html'}", soft_wrap=True)
     summary = {"outcomes": []} if found is None else found.summary
     return Outcome({**summary, "not_compared": reason, **comparison_summary(fits)})
-
-
-def _sessions(fits: list[Fit], conditions: tuple[str, str] | None, progress: Progress) -> tuple[Comparison | None, str]:
-    """Return what changed between two sessions, or why that cannot be determined."""
-    if len(fits) > 2:
-        return None, "there are more than two results"
-    before, after = fits
-    if reason := why_incomparable(before, after):
-        return None, reason
-    try:
-        return compare_sessions(before, after, conditions, progress), ""
-    except KinertiaError as error:  # results of several conditions may be compared otherwise
-        if conditions is not None:
-            raise
-        return None, str(error)
 
 
 def _write_tables(folder: Path, found: Comparison) -> None:
@@ -126,11 +111,13 @@ def _print_bodies(fits: dict[str, Fit]) -> None:
         out.print(f"{name} against {first_name}: {sentence}")
 
 
-def _compare_conditions(path: Path, conditions: tuple[str, str], output: Path, overwrite: bool) -> Outcome:
+def _compare_conditions(
+    path: Path, conditions: tuple[str, str], norms: Path | None, output: Path, overwrite: bool
+) -> Outcome:
     """Compare trials of two conditions in one estimate, which is made first if a subject file is given."""
     results_folder(output, overwrite)
     with shown_progress() as progress:
-        found = compare_sessions(path, None, conditions, progress)
+        found = compare_sessions(path, None, conditions, progress, norms)
     with complete_folder(output, "compare") as work:
         (work / "compare.html").write_text(found.page(), encoding="utf-8")
         _write_tables(work, found)

@@ -7,7 +7,10 @@ import numpy as np
 import pytest
 
 from kinertia.estimation.changes import change
-from kinertia.estimation.changes.change import NOTABLE, speed_change
+from kinertia.estimation.changes.change import NOTABLE, profile_changes, speed_change
+from kinertia.estimation.result.gait_scores import with_norms
+from kinertia.io.norms_file import Norm
+from kinertia.motion.model_outputs import CLINICAL_ANGLES
 from kinertia.report.comparison.change_tables import speed_sentence
 
 
@@ -51,3 +54,19 @@ def test_a_walk_without_strides_has_the_speed_of_its_pelvis(fit):
     vars(alone := replace(trial))["strides"] = ()
     (speed,) = change._speeds(alone)
     assert speed == pytest.approx(with_strides.mean(), rel=0.05)
+
+
+def test_the_gait_profile_score_of_each_side_is_compared(fit):
+    """Each stride's score against norms of zero, as in `cycles.csv`; other norms give other scores."""
+    norms = {name: Norm(np.array([0.0, 100.0]), np.zeros(2), np.ones(2)) for name in CLINICAL_ANGLES}
+    columns = with_norms(fit.cycles().to_dict("list"), norms, fit.skeleton)
+    known = {side: [g for s, g in zip(columns["side"], columns["gps"], strict=True) if s == side] for side in "rl"}
+    found = {one.side: one for one in profile_changes(fit.trials, fit.trials, norms)}
+    assert found
+    for side, one in found.items():
+        assert one.before == pytest.approx(np.mean(list(dict.fromkeys(g for g in known[side] if np.isfinite(g)))))
+        assert one.difference == pytest.approx(0.0, abs=1e-12)
+        assert (one.quantity, one.joint, one.component, one.unit) == ("gait", "gait profile", "score", "degrees")
+    higher = {name: replace(norm, mean=norm.mean + 30.0) for name, norm in norms.items()}
+    (other, *_) = profile_changes(fit.trials, fit.trials, higher)
+    assert other.before != pytest.approx(found[other.side].before)

@@ -11,7 +11,7 @@ from command_line import run
 from kinertia.errors import KinertiaError
 from kinertia.estimation.changes import condition_changes
 from kinertia.estimation.changes.change import SOURCES
-from kinertia.estimation.changes.condition_changes import changes, changes_of_strides
+from kinertia.estimation.changes.condition_changes import changes_of_strides
 from kinertia.estimation.changes.stride_features import EVENTS, Rows, event_bounds
 from kinertia.motion.gait_cycle import Stride
 from kinertia.report.comparison.change_tables import (
@@ -21,6 +21,7 @@ from kinertia.report.comparison.change_tables import (
     discovered,
     limit_sentences,
 )
+from kinertia.report.comparison.what_changed import compare
 from kinertia.report.exports.saved_fit import write_fit
 
 DRAWS = 1000
@@ -122,7 +123,7 @@ def twice(fit):
 def found(twice):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(condition_changes, "DRAWS", 6)
-        return changes(twice, "barefoot", "with shoes")
+        return compare(twice, conditions=("barefoot", "with shoes")).outcomes
 
 
 def test_a_walk_has_not_changed_from_itself(found):
@@ -181,4 +182,4 @@ def test_the_command_compares_conditions_of_a_result(twice, fit, tmp_path):
     assert refused.status == 2
     assert "stated are: barefoot, with shoes" in refused.err
     with pytest.raises(KinertiaError):
-        changes(fit, "barefoot", "with shoes")
+        compare(fit, conditions=("barefoot", "with shoes"))

@@ -11,8 +11,9 @@ import kinertia
 from command_line import run
 from kinertia.errors import KinertiaError
 from kinertia.estimation.changes import session_changes as module
-from kinertia.estimation.changes.session_changes import Session, session, session_changes, why_incomparable
+from kinertia.estimation.changes.session_changes import session, why_incomparable
 from kinertia.model.bsp import BodySegmentParameters
+from kinertia.report.comparison.what_changed import compare
 from kinertia.report.exports.saved_fit import write_fit
 from report_page import Elements
 
@@ -45,7 +46,7 @@ def sessions(fit):
 def compared(*fits, draws=12):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "DRAWS", draws)
-        return session_changes(*(session(fit) for fit in fits))
+        return compare(*fits).outcomes
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +118,7 @@ def test_what_cannot_be_compared_says_why(sessions, two_level):
     other = replace(after, posterior=replace(after.posterior, draws=fewer))
     assert "different models" in why_incomparable(before, other)
     with pytest.raises(KinertiaError, match="same recording"):
-        session_changes(Session(before, "", before.trials), Session(before, "", before.trials))
+        compare(before, before)
 
 
 def test_a_session_of_several_conditions_needs_a_choice(sessions):

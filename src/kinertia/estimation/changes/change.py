@@ -10,8 +10,10 @@ from typing import Literal
 import numpy as np
 from scipy import stats
 
-from kinertia.estimation.result.cycles import spatiotemporal_columns
+from kinertia.estimation.result.cycles import cycle_columns, spatiotemporal_columns
+from kinertia.estimation.result.gait_scores import with_norms
 from kinertia.estimation.result.trial_fit import TrialFit
+from kinertia.io.norms_file import Norm
 
 Verdict = Literal["changed", "not shown", "cannot be judged"]
 SOURCES = ("instruments", "body", "markers", "stride")
@@ -100,6 +102,19 @@ class Change:
         return (self.quantity, self.joint, self.component, self.event) in PRIMARY
 
 
+def shown_from(difference: float, sd: float, freedom: float) -> tuple[float, float]:
+    """Return the smallest change that is beyond 95 % by Student's t, and the p value of a difference.
+
+    Args:
+        difference, sd: of the difference.
+        freedom: degrees of freedom of `sd`; infinite where it is known, NaN where nothing can be judged.
+    """
+    if np.isnan(freedom):
+        return np.nan, np.nan
+    of_sd = stats.t(freedom)
+    return float(of_sd.ppf(0.975)) * sd, float(2.0 * of_sd.sf(abs(difference) / max(sd, 1e-300)))
+
+
 def named_outcome(name: str) -> tuple[str, str, str]:
     """Return quantity, joint and component of "moment knee_adduction" or "angle knee_angle".
 
@@ -136,6 +151,30 @@ MEASURES = (
     Measure("stance_percent", "stance", "share", "%", sided=True),
     Measure("step_width_m", "step", "width", "m"),
 )
+
+
+GPS = Measure("gps", "gait profile", "score", "degrees", sided=True)
+
+
+def profile_changes(
+    before: Sequence[TrialFit], after: Sequence[TrialFit], norms: Mapping[str, Norm]
+) -> tuple[Change, ...]:
+    """Compare the Gait Profile Score of each side between strides, each walk counted once as in `speed_change`."""
+    tables = [[_stride_scores(trial, norms) for trial in trials] for trials in (before, after)]
+    found = []
+    for side in ("r", "l"):
+        known = [[own for table in some if (own := _values(table, GPS, side)).size] for some in tables]
+        found.append(_change(GPS, side, known))
+    return tuple(one for one in found if one is not None)
+
+
+def _stride_scores(trial: TrialFit, norms: Mapping[str, Norm]) -> dict[str, list[object]]:
+    """Return side and score of each stride."""
+    columns = cycle_columns([trial], 1.0, "estimate")  # angles are independent of body mass
+    scored = with_norms(columns, norms, trial.skeleton)
+    keys, values = zip(scored["side"], scored["stride"], strict=True), scored["gps"]
+    strides = {key: value for key, value in zip(keys, values, strict=True) if np.isfinite(value)}
+    return {"side": [side for side, _ in strides], "gps": list(strides.values())}
 
 
 def speed_change(before: Sequence[TrialFit], after: Sequence[TrialFit]) -> Change | None:
@@ -176,7 +215,7 @@ def _change(measure: Measure, side: str, known: Sequence[Sequence[np.ndarray]]) 
     squares = [spread**2 / count for spread, count in zip(spreads, counts, strict=True)]
     sd = float(np.sqrt(sum(squares)))
     freedom = sum(squares) ** 2 / max(sum(s**2 / max(n - 1, 1) for s, n in zip(squares, counts, strict=True)), 1e-300)
-    of_sd = stats.t(max(freedom, 1.0)) if np.isfinite(freedom) else None
+    mdc95, p = shown_from(means[1] - means[0], sd, max(freedom, 1.0) if np.isfinite(freedom) else np.nan)
     return Change(
         quantity="gait",
         joint=measure.joint,
@@ -189,8 +228,8 @@ def _change(measure: Measure, side: str, known: Sequence[Sequence[np.ndarray]]) 
         strides=(counts[0], counts[1]),
         sd=sd,
         sd_by_source={source: sd if source == "stride" else 0.0 for source in SOURCES},
-        mdc95=np.nan if of_sd is None else float(of_sd.ppf(0.975)) * sd,
-        p=np.nan if of_sd is None else float(2.0 * of_sd.sf(abs(means[1] - means[0]) / max(sd, 1e-300))),
+        mdc95=mdc95,
+        p=p,
         stride_sd=(spreads[0], spreads[1]),
     )
 

@@ -16,10 +16,9 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
-from scipy import stats
 
 from kinertia.errors import KinertiaError
-from kinertia.estimation.changes.change import SOURCES, UNITS, Change, named_outcome
+from kinertia.estimation.changes.change import SOURCES, UNITS, Change, named_outcome, shown_from
 from kinertia.estimation.changes.stride_features import Rows, StrideFeatures, stride_features, usual_sources
 from kinertia.estimation.result.drawn_fit import kept_draws
 from kinertia.estimation.result.fit import Fit
@@ -88,14 +87,6 @@ def condition_features(
     condition = {trial.name: trial.kinematics.trial.condition for trial in chosen}
     found = stride_features(fit, chosen, usual_sources(fit), min(DRAWS, kept_draws(fit).count), progress)
     return found, condition
-
-
-def changes(
-    fit: Fit, before: str, after: str, progress: Callable[[float], None] = lambda share: None
-) -> tuple[Change, ...]:
-    """Compare the strides of two conditions in one estimate from all trials: arguments of `condition_features`."""
-    found, condition = condition_features(fit, before, after, progress)
-    return tuple(changes_of_strides(found.events, masks_of(found.events, condition, before, after)))
 
 
 def masks_of(rows: Rows, condition: Mapping[str, str], *names: str) -> list[np.ndarray]:
@@ -218,9 +209,10 @@ def _change(
     variances = {**measured, "stride": sum(between)}
     total = sum(variances.values())
     of_strides = sum(each**2 / own_freedom for each, own_freedom in zip(between, freedom, strict=True))
-    of_sd = stats.t(total**2 / of_strides) if of_strides > 0.0 else stats.norm()
-    sd = float(np.sqrt(total))
     enough = min(one.count for one in own) > 1
+    of_sd = (total**2 / of_strides if of_strides > 0.0 else np.inf) if enough else np.nan
+    sd = float(np.sqrt(total))
+    mdc95, p = shown_from(after.mean - before.mean, sd, of_sd)
     return Change(
         quantity=quantity,
         joint=joint,
@@ -233,8 +225,8 @@ def _change(
         strides=(before.count, after.count),
         sd=sd,
         sd_by_source={source: float(np.sqrt(variances[source])) for source in SOURCES},
-        mdc95=float(of_sd.ppf(0.975)) * sd if enough else np.nan,
-        p=float(2.0 * of_sd.sf(abs(after.mean - before.mean) / max(sd, 1e-300))) if enough else np.nan,
+        mdc95=mdc95,
+        p=p,
         stride_sd=(float(np.sqrt(strides[0])), float(np.sqrt(strides[1]))),
         assumed=bool(usual) and min(one.count for one in own) < FEW,
     )

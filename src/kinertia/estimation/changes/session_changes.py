@@ -99,24 +99,6 @@ def why_incomparable(before: Fit, after: Fit) -> str:
     return ""
 
 
-def session_changes(
-    before: Session, after: Session, progress: Callable[[float], None] = lambda share: None
-) -> tuple[Change, ...]:
-    """Compare the strides of two sessions of one person.
-
-    Args:
-        before, after: the sessions.
-        progress: is told the share done.
-
-    Raises:
-        KinertiaError: they cannot be compared (`why_incomparable`).
-    """
-    if reason := why_incomparable(before.fit, after.fit):
-        raise KinertiaError(reason)
-    first, second = session_features(before, after, progress)
-    return changes_between(first.events, second.events, before.fixed_axes or after.fixed_axes)
-
-
 def session_features(
     before: Session, after: Session, progress: Callable[[float], None] = lambda share: None, draws: int | None = None
 ) -> tuple[StrideFeatures, StrideFeatures]:

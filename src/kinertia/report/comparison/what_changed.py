@@ -4,13 +4,13 @@ What all trials of one estimate share cancels in a difference, and what the esti
 remains are errors of one condition only, and errors that a user waived.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from kinertia.errors import KinertiaError
-from kinertia.estimation.changes.change import Change, gait_changes, speed_change
+from kinertia.estimation.changes.change import Change, gait_changes, profile_changes, speed_change
 from kinertia.estimation.changes.condition_changes import changes_of_strides, condition_features, masks_of
 from kinertia.estimation.changes.curve_changes import CurveChange, apart, curve_changes, paired, rows_of
 from kinertia.estimation.changes.session_changes import (
@@ -22,8 +22,10 @@ from kinertia.estimation.changes.session_changes import (
 )
 from kinertia.estimation.prepare.prepared import Prepared, Progress
 from kinertia.estimation.result.fit import Fit
+from kinertia.estimation.result.gait_profile import check_convention, expect_all_nine
 from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.findings.finding import Finding, Severity
+from kinertia.io.norms_file import Norm, read_norms
 from kinertia.io.subject.reader import read_subject
 from kinertia.report.comparison.change_tables import (
     RELEVANT,
@@ -60,7 +62,7 @@ class Comparison:
         before, after: their names.
         outcomes: joint moments and angles, event by event.
         speed: walking speed, which changes moments; None where it is not known.
-        gait: cadence, stride length, share of stance and step width, where they are known.
+        gait: cadence, stride length, share of stance and step width, where they are known; gait profile with norms.
         curves: joint moments and angles over the gait cycle, or over stance.
         doubt: findings about instruments that keep changes of moments from being judged.
 
@@ -115,6 +117,7 @@ def compare(
     after: Fit | str | Path | None = None,
     conditions: tuple[str, str] | None = None,
     progress: Progress = lambda stage, share: None,
+    norms: str | Path | None = None,
 ) -> Comparison:
     """Determine what changed: joint moments and angles, event by event.
 
@@ -123,6 +126,7 @@ def compare(
             `conditions` of the first are compared.
         conditions: of the trials before and after, as their `condition` in the subject file.
         progress: called as the work progresses, with a stage's name and the share of it that is done.
+        norms: CSV file of `kinertia norms`: adds the Gait Profile Score of each side.
 
     Raises:
         KinertiaError: they cannot be compared; it says why.
@@ -140,7 +144,7 @@ def compare(
         rows, later = session_features(first, other, share_done)
         outcomes = changes_between(rows.events, later.events, first.fixed_axes or other.fixed_axes)
         curves = curve_changes(rows.curves, later.curves, apart)
-        return _comparison(conditions or ("before", "after"), first, other, outcomes, curves)
+        return _comparison(conditions or ("before", "after"), first, other, outcomes, curves, norms)
     if conditions is None:
         raise KinertiaError("give two sessions, or two conditions of one")
     if isinstance(before, Fit) or Path(before).is_dir():
@@ -152,18 +156,55 @@ def compare(
     found = changes_of_strides(features.events, masks_of(features.events, condition, *conditions))
     masks = masks_of(features.curves, condition, *conditions)
     early, late = (rows_of(features.curves, mask) for mask in masks)
-    return _comparison(conditions, first, other, found, curve_changes(early, late, paired))
+    return _comparison(conditions, first, other, found, curve_changes(early, late, paired), norms)
+
+
+def compared_sessions(
+    fits: Sequence[Fit],
+    conditions: tuple[str, str] | None = None,
+    progress: Progress = lambda stage, share: None,
+    norms: str | Path | None = None,
+) -> tuple[Comparison | None, str]:
+    """Return what changed between two results, or why that cannot be determined.
+
+    Raises:
+        KinertiaError: their `conditions` cannot be compared, or norms do not fit.
+    """
+    if len(fits) != 2:
+        return None, "there are more than two results"
+    before, after = fits
+    if reason := why_incomparable(before, after):
+        return None, reason
+    try:
+        return compare(before, after, conditions, progress, norms), ""
+    except KinertiaError as error:  # results of several conditions may be compared otherwise
+        if conditions is not None or norms is not None:
+            raise
+        return None, str(error)
 
 
 def _comparison(
-    names: tuple[str, str], first: Session, other: Session, outcomes: Iterable[Change], curves: Iterable[CurveChange]
+    names: tuple[str, str],
+    first: Session,
+    other: Session,
+    outcomes: Iterable[Change],
+    curves: Iterable[CurveChange],
+    norms: str | Path | None,
 ) -> Comparison:
     """Add speed, steps and doubts about instruments."""
     doubts = instrument_doubts((first.fit, first.trials), (other.fit, other.trials))
     doubt = " ".join(dict.fromkeys(doubts.values()))
     judged = tuple(replace(one, doubt=doubts.get(one.side, "") if one.quantity == "moment" else "") for one in outcomes)
     walks = first.trials, other.trials
-    return Comparison(*names, judged, speed_change(*walks), gait_changes(*walks), tuple(curves), doubt)
+    gait = gait_changes(*walks) + (() if norms is None else _profiles(first, other, read_norms(norms)))
+    return Comparison(*names, judged, speed_change(*walks), gait, tuple(curves), doubt)
+
+
+def _profiles(first: Session, other: Session, norms: Mapping[str, Norm]) -> tuple[Change, ...]:
+    expect_all_nine(norms)
+    for one in (first, other):
+        check_convention(one.fit, norms)
+    return profile_changes(first.trials, other.trials, norms)
 
 
 def fit_of(source: Fit | str | Path, progress: Progress) -> Fit:
