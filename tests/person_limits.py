@@ -103,11 +103,12 @@ def supported_elsewhere(share=0.5, seconds=0.5, complete=0.5):
     return stated_mass(person)
 
 
-def late(seconds, patched):
+def late(seconds, patched, uneven_s=0.0):
+    """Loads that begin and end late; where they are uneven, they begin later by this and end earlier by it."""
     delays = SimpleNamespace(
         grows=lambda: False,
         delay_s=seconds,
-        median_s=np.full(2, seconds),
+        median_s=seconds + np.array([uneven_s, -uneven_s]),
         time=np.zeros((3, 2)),
         by_rate=lambda start: None,
     )

@@ -44,7 +44,8 @@ def codes_in(path):
 
 
 def test_every_code_is_asserted_by_a_test():
-    paths = [path for path in TESTS.rglob("test_*.py") if path.relative_to(TESTS).parts[0] not in ABOUT_CODES]
+    tests = [path for path in TESTS.rglob("test_*.py") if path.relative_to(TESTS).parts[0] not in ABOUT_CODES]
+    paths = [*tests, *TESTS.glob("*_limits.py")]  # cases of `test_limits`
     asserted = set().union(*(codes_in(path) for path in paths if path != Path(__file__)))
     assert sorted(RULES.keys() - asserted) == []
 

@@ -58,6 +58,23 @@ def test_an_ankle_axis_is_judged_by_the_foot():
     assert [(one.part, one.limit.name) for one in departed] == [("ankle_l", "ankle axis")]
 
 
+def feet_turned(angle_deg):
+    """What is found of the right foot once its toes are rotated outwards about the heel."""
+    positions = standing_positions()
+    for toe in [label for label in positions if label.startswith("R.Toe")]:
+        positions = rotated_about(positions, "R.Heel", toe, -angle_deg)
+    return [one for one in found(positions) if one.part == "foot_r"]
+
+
+@pytest.mark.parametrize(("limit_deg", "inside", "beyond"), [(53.0, -1.0, 1.0), (-37.0, 1.0, -1.0)])
+def test_feet_may_point_outwards_farther_than_inwards(limit_deg, inside, beyond):
+    """45 degrees from 8 outwards, where people's feet point."""
+    (across,) = feet_turned(90.0)
+    standing_deg = np.degrees(across.angle_rad) - 90.0
+    assert feet_turned(limit_deg - standing_deg + inside) == []
+    assert len(feet_turned(limit_deg - standing_deg + beyond)) == 1
+
+
 def plug_in(wand_ahead_m, shank_wand_m=(0.0, 0.12, 0.03)):
     """A person in Plug-in Gait's markers, with wands this far in front of the lateral line of the thigh, and from the
     lateral malleolus forwards, up and outwards.

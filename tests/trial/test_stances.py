@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kinertia.trial.data import FootLoads, Markers, Trial
-from kinertia.trial.stances import joined_coverage, leg_coverage, stances_of
+from kinertia.trial.stances import LegCoverage, joined_coverage, leg_coverage, stances_of
 
 TIME = np.arange(301) / 100.0
 
@@ -62,6 +62,20 @@ def test_what_is_known_of_a_leg(shown, sentence, missing):
     assert right.sentence == sentence
     assert left.sentence == "left: none in stance"
     assert missing is None or right.missing == missing
+
+
+def of_stance(percent):
+    """A leg of which the first percent of stance are known, and no stride."""
+    return LegCoverage("r", np.arange(101) < percent, None)
+
+
+def test_less_than_a_tenth_of_stance_is_none_of_it():
+    assert [of_stance(percent).none for percent in (0, 10, 11, 20)] == [True, True, False, False]
+
+
+def test_a_phase_of_which_a_tenth_is_unknown_is_not_missing():
+    """Push-off is 65 to 100 % of stance: 36 of 101."""
+    assert [of_stance(percent).missing for percent in (97, 98)] == [("push-off",), ()]
 
 
 def test_parts_of_several_stances_and_trials_add_up():

@@ -7,6 +7,7 @@ import pytest
 
 from kinertia.trial.data import Markers
 from loads_and_feet import doubted, error_of, feet_of
+from person_limits import late as late_contacts
 from recordings import LONG_WALKS, QUICK_WALKS, RUNS, WALKS, slow_beside
 from walk_on_plates import ALL_STEPS, FEET, STRIDE_M
 from walk_on_plates import walk as simple_walk
@@ -171,3 +172,10 @@ def test_points_of_one_plate_in_mm(plate):
     wrong = replace(recording, plates=replace(recording.plates, moment=moment))
     assert error_of(wrong, FEET).where.plate == f"plate {plate + 1}"
     assert "P204" in doubted(wrong, FEET)
+
+
+def test_both_ends_of_loads_have_to_be_late(monkeypatch):
+    """A plate that is left early, or a foot that drags, moves one end: of 60 ms on average 22.5 ms at least at each."""
+    assert [one.code for one in late_contacts(0.06, monkeypatch, uneven_s=0.036)] == ["T211"]
+    assert late_contacts(0.06, monkeypatch, uneven_s=0.039) == []
+    assert late_contacts(-0.06, monkeypatch, uneven_s=0.039) == []

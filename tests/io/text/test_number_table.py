@@ -84,3 +84,11 @@ def test_a_few_markers_of_something_else_are_no_person(tmp_path):
     assert names == ["Wand:A", "Wand:B", *(f"M{k}" for k in range(9))]
     with refused("F161", None, people="Anna: 9, Ben: 8"):
         without_prefixes(tmp_path / "x.trc", [*(f"Ben:M{k}" for k in range(8)), *labels])
+
+
+def test_forces_have_ten_samples_a_second_at_least():
+    """At fewer, times are in another unit, or not of forces."""
+    assert uniform_times(PATH, 0.099 * np.arange(50))[1] == ()
+    with pytest.raises(FileError) as error:
+        uniform_times(PATH, 0.101 * np.arange(50))
+    assert error.value.finding.code == "T106"

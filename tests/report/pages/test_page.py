@@ -14,12 +14,13 @@ import pytest
 from command_line import run
 from found import FAULT_FREE, UNEXPLAINED, UNUSABLE
 from kinertia.diagnostics.result.suitability import Suitability
+from kinertia.findings.finding import Severity, finding
 from kinertia.io.subject.provenance import provenance_of
 from kinertia.io.subject.reader import read_subject
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.report.figures.figure import packed_script
 from kinertia.report.pages.finding_view import FindingView
-from kinertia.report.pages.headline import Purpose, purposes, without_repetition, words
+from kinertia.report.pages.headline import Purpose, impossible, purposes, without_repetition, words
 from kinertia.report.pages.page import bsp_rows, render
 from kinertia.report.wording import fixed
 from report_page import Elements, figures_of
@@ -54,6 +55,12 @@ def test_purposes_follow_the_outputs(segments, together):
     *_, opensim = purposes(outputs, no_body=True)
     assert opensim.use == "do not use"
     assert "R202" in opensim.reason
+
+
+def test_a_light_body_that_was_not_estimated_does_not_keep_simulations_from_using_the_others():
+    """Its impossible inertia is the model's own: R202 is an INFO there."""
+    for severity, no_body in ((None, True), (Severity.INFO, False)):
+        assert impossible(SimpleNamespace(findings=(finding("R202", None, severity),))) is no_body
 
 
 def test_estimates_far_from_the_literature_are_named(fit):

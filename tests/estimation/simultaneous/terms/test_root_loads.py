@@ -34,6 +34,18 @@ def test_kappa_takes_from_the_first_moment_of_the_trunk_only(problem):
     np.testing.assert_allclose(after[others], before[others], atol=1e-12)
 
 
+def test_a_rod_that_bends_loses_as_much_inertia_as_kappa_says():
+    """Points of a uniform rod go down by what a load along it displaces them, which grows with their height squared."""
+    height, mass_kg, kappa = (np.arange(1000) + 0.5) / 1000 * 0.6, 30.0 / 1000, 0.01
+    down = np.square(height) * kappa / (mass_kg * np.square(height).sum())
+    straight, bent = (np.square(each).sum() * mass_kg for each in (height, height - down))
+    moment = straight - 30.0 * 0.3**2  # about the centre of mass
+    inertia = np.diag([moment, 0.01, moment])[None]
+    rod = BodySegmentParameters(("torso",), np.array([30.0]), np.array([[0.0, 0.3, 0.0]]), inertia)
+    before, after = (one.dynamic_parameters() for one in (rod, BendingTrunk.of(rod, 60.0).bent(rod, kappa)))
+    assert (after - before)[[4, 9]] == pytest.approx(bent - straight, rel=0.01)
+
+
 @pytest.mark.parametrize(
     ("names", "masses"), [(("pelvis", "femur_r"), (10.0, 8.0)), (("lumbar1", "torso"), (15.0, 15.0))]
 )
