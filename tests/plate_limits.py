@@ -6,13 +6,14 @@ import numpy as np
 
 from kinertia.diagnostics.evidence.shared_and_stray_loads import stray_contacts
 from kinertia.diagnostics.plates import cop_path, free_moments, plate_height
+from kinertia.diagnostics.plates import signals as plate_signals
 from kinertia.diagnostics.plates.axes_and_units import axes_and_units
 from kinertia.diagnostics.plates.cop_path import cop_on_plate
 from kinertia.diagnostics.plates.cop_positions import loads_and_feet
 from kinertia.diagnostics.plates.gains import gains
 from kinertia.diagnostics.plates.ground_contact import stray_loads
 from kinertia.diagnostics.plates.plate_positions import repeated_plates
-from kinertia.diagnostics.plates.signals import dead_moments, mains_interference, quantisation, signals
+from kinertia.diagnostics.plates.signals import dead_moments, low_passed, mains_interference, quantisation, signals
 from kinertia.diagnostics.plates.zeros import zeros
 from kinertia.findings.where import Where
 from kinertia.trial.data import PlateLoads
@@ -65,7 +66,12 @@ def of_mass(kg, level_n=14.0):
 def overshooting(seconds):
     loads = plates(STEADY, np.full(200, 0.5))
     object.__setattr__(loads, "unloaded", (UnloadedReading((0.0, 0.0, 0.0), 0.0, 800.0, seconds),))
-    return quantisation(plates_alone(loads))
+    return low_passed(plates_alone(loads))
+
+
+def of_bandwidth(hz, patched):
+    patched.setattr(plate_signals, "load_bandwidth_hz", lambda time, vertical: hz)
+    return low_passed(plates_alone(plates(STEADY, np.full(200, 0.5))))
 
 
 def weak(peak_n):
@@ -234,6 +240,7 @@ PLATE_LIMITS = {
     ),
     "P107 amplitude": (humming, 3.9, 4.1, [], ["WARNING"]),
     "P107 loud": (humming, 14.8, 15.2, ["WARNING"], ["ERROR"]),
+    "P108 cutoff": (of_bandwidth, 10.1, 9.9, [], ["WARNING"]),
     "P108 overshoot": (overshooting, 0.059, 0.061, [], ["WARNING"]),
     "P111 dead": (dead_moment, 0.51, 0.49, [], ["ERROR"]),
     "P202 weakest": (weak, 0.29, 0.31, [], ["ERROR"]),

@@ -104,7 +104,9 @@ def small_ground(trial: SyntheticTrial, rng: np.random.Generator) -> FootPlates:
     at_samples, at_frames = carriers
     impact = rng.normal(0.0, 5.0, wrench.shape)
     turn = Rotation.from_euler("y", 90, degrees=True).as_matrix()
-    reactions = GroundReactions(fine, wrench, at_samples, impact, None, NOISE_N)
+    reactions = GroundReactions(
+        fine, wrench, at_samples, impact, None, NOISE_N, blurred=rng.normal(0.0, 3.0, wrench.shape)
+    )
     middles = np.array([[0.2, 0.0, 0.1], [0.9, 0.0, -0.2], [1.5, 0.0, 0.3]])
     loaded = smooth(trial.time, np.stack([trial.time > 0.1, trial.time < SWITCH_S], axis=1), 15.0)
     return FootPlates(loads, loaded, reactions, ("first", "second", "third"), at_frames, turn, middles)

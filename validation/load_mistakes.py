@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
+from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
@@ -269,6 +270,19 @@ def at_rate(factor: float) -> Change:
         rows = np.searchsorted(plates.time, at[at <= plates.time[-1]])
         rows = np.concatenate([rows, np.full(len(plates.time) - len(rows), len(plates.time) - 1)])
         return replace(plates, force=plates.force[rows], moment=plates.moment[rows])
+
+    return loads(change)
+
+
+def low_passed(cutoff_hz: float) -> Change:
+    """Return a fault that filters loads with a zero-lag Butterworth filter of fourth order; small ones become zero."""
+
+    def change(plates: PlateLoads) -> PlateLoads:
+        rate_hz = 1.0 / float(np.median(np.diff(plates.time)))
+        sections = butter(2, cutoff_hz, fs=rate_hz, output="sos")
+        wrench = sosfiltfilt(sections, plates.wrench, axis=0)
+        wrench = np.where(wrench[..., 1:2] > LOAD_THRESHOLD_N / 2, wrench, 0.0)
+        return replace(plates, force=wrench[..., :3], moment=wrench[..., 3:])
 
     return loads(change)
 

@@ -197,6 +197,7 @@ MISTAKES = (
     Mistake("forces at a rate 10 % off", forces.at_rate(1.1), _codes("T201")),
     Mistake("markers at 30 Hz", markers.few_frames(30.0), _codes("M124")),
     Mistake("markers low-passed at 3 Hz", markers.low_passed(3.0), _codes("M133")),
+    Mistake("forces low-passed at 8 Hz", forces.low_passed(8.0), _codes("P108")),
     Mistake("cameras' scale 2 % too large in the walk", markers.scaled(1.02, "walk"), _codes("S205")),
     Mistake(
         "cameras' scale 2 % too large in both trials", markers.scaled(1.02, "both"), _codes("S205", "P243", "P246")

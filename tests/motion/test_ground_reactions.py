@@ -135,3 +135,21 @@ def test_an_impact_acts_under_the_foot_where_a_light_load_puts_its_centre_of_pre
     assert np.abs(taken[:, 1]).max() > 50.0
     about_foot = taken[:, 3:] - np.cross(PLACES[0], taken[:, :3])
     np.testing.assert_allclose(about_foot[:, [0, 2]], 0.0, atol=1e-6)
+
+
+def stance(at_s: float) -> np.ndarray:
+    """A step of 0.6 s that begins and ends within milliseconds."""
+    return WEIGHT_N * (1.0 - step(at_s)) * step(at_s + 0.6) * (1.0 + 0.1 * np.cos(4.0 * np.pi * (TIME - at_s) / 0.6))
+
+
+def test_forces_that_were_low_passed_are_uncertain_around_contacts():
+    sound = loads(stance(0.3), stance(0.9))
+    assert not np.any(measured_reactions(kinematics(sound)).blurred)
+    filtered = smooth(TIME, sound.reshape(-1, 12), 8.0)(TIME).reshape(-1, 2, 6)
+    reactions = ground_reactions(kinematics(filtered), 10.0)
+    lost, expected = (sound - filtered)[..., 1], reactions.blurred[..., 1]
+    near = np.abs(TIME[:, None] - np.array([0.3, 0.9])) < 0.1
+    assert 0.2 < np.sqrt(np.square(expected[near]).mean() / np.square(lost[near]).mean()) < 1.0
+    middle = slice(500, 700)  # of the first stance
+    assert np.square(expected[middle, 0]).mean() < 0.04 * np.square(expected[near]).mean()
+    np.testing.assert_array_equal(reactions.uncertain, reactions.impact + reactions.blurred)

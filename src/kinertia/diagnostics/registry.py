@@ -46,7 +46,14 @@ from kinertia.diagnostics.plates.ground_contact import (
 )
 from kinertia.diagnostics.plates.plate_height import plate_heights
 from kinertia.diagnostics.plates.plate_positions import repeated_plates
-from kinertia.diagnostics.plates.signals import dead_moments, mains_interference, quantisation, signals, spikes
+from kinertia.diagnostics.plates.signals import (
+    dead_moments,
+    low_passed,
+    mains_interference,
+    quantisation,
+    signals,
+    spikes,
+)
 from kinertia.diagnostics.plates.zeros import unloaded_levels, zeros, zeros_under_load
 from kinertia.diagnostics.runner import Check
 from kinertia.diagnostics.subject.body_data import absent_markers, population, stated_and_filed, stature
@@ -106,6 +113,7 @@ SIGNAL_CHECKS: tuple[Check[RecordingContext], ...] = (
     signals,
     dead_moments,
     quantisation,
+    low_passed,
     mains_interference,
     zeros,
     free_moments,

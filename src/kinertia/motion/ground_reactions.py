@@ -10,6 +10,9 @@ et al. 2012, J Biomech 45:666).
 So forces keep the bandwidth of the plates, and only the part of their sum that is faster than the motion is subtracted,
 from the foot that causes it, where it exceeds the usual error of rigid segments. If forces and motion have one
 bandwidth (the two-level estimate of the study), nothing is faster.
+
+Forces that were low-pass filtered before lack what their plates measured, and spread each contact in time. That cannot
+be undone, but its size can be told from what the same filter would take away again, and joint moments are as uncertain.
 """
 
 from dataclasses import dataclass, replace
@@ -26,6 +29,7 @@ from kinertia.motion.workload import pieces
 from kinertia.settings import ForceCutoff
 from kinertia.trial.centre_of_pressure import held_centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N
+from kinertia.trial.load_bandwidth import load_bandwidth_hz
 from kinertia.trial.sampled_data import nearest_samples, rms_length
 
 IMPACT_SHARE_OF_WEIGHT = 0.01
@@ -35,6 +39,9 @@ FIRM_SHARE_OF_PEAK = 0.1
 """Share of the largest vertical force below which a centre of pressure is too uncertain for an impact to act there."""
 NOISE_LEFT_N = 1.0
 """Standard deviation of the noise that may remain in the vertical force."""
+BLURRED_HZ, _BLURRED_TWICE = 12.5, 0.5
+"""Forces were filtered if their bandwidth is below the first. With this share of what the filter would take away again,
+moments of knees and ankles of four OpenSim truths, filtered at 10 Hz, are covered in 98 % (without it: 93 and 84)."""
 _FORGOTTEN = 40
 """Number of samples beyond which a sample does not affect a natural cubic spline: each divides its weight by 3.7, so
 that after this many it is below rounding."""
@@ -55,6 +62,8 @@ class GroundReactions:
         cutoff_hz: low-pass cutoff of the forces; None: as the plates gave them.
         noise_n: standard deviation of the plates' noise that remains in the forces.
         without_impact: whether the impact was subtracted from `wrench`.
+        blurred: (k, 2, 6) part that a filter may have taken away before the file was written, standard deviation; zero
+            where the forces were not filtered.
     """
 
     time: np.ndarray
@@ -64,6 +73,7 @@ class GroundReactions:
     cutoff_hz: float | None
     noise_n: float = 0.0
     without_impact: bool = False
+    blurred: np.ndarray | float = 0.0
 
     @property
     def whole(self) -> Self:
@@ -113,9 +123,14 @@ class GroundReactions:
         interval = np.clip(np.searchsorted(samples, time, side="right") - 1, 0, len(samples) - 2)
         return loads_and_rates(samples, self.wrench[near], self.point[near], np.ascontiguousarray(time), interval)
 
-    def impact_at(self, time: np.ndarray) -> np.ndarray:
-        """Return `impact` (n, 2, 6) at the samples nearest to these times."""
-        return self.impact[nearest_samples(self.time, time)]
+    @property
+    def uncertain(self) -> np.ndarray:
+        """The part (k, 2, 6) of which one share, of mean 0 and standard deviation 1, may have to be added."""
+        return self.impact + self.blurred
+
+    def uncertain_at(self, time: np.ndarray) -> np.ndarray:
+        """Return `uncertain` (n, 2, 6) at the samples nearest to these times."""
+        return self.uncertain[nearest_samples(self.time, time)]
 
     def loaded_at(self, time: np.ndarray) -> np.ndarray:
         """Return `loaded` (n, 2) at the samples nearest to these times."""
@@ -132,7 +147,18 @@ def measured_reactions(kinematics: Kinematics) -> GroundReactions:
         cutoff_hz = float(max(rate_hz / 2.0 * (NOISE_LEFT_N / loads.noise_n) ** 2, kinematics.cutoff_hz))
         wrench = _low_passed(time, wrench, cutoff_hz)
     noise_n = _noise_left(loads.noise_n, rate_hz, cutoff_hz)
-    return GroundReactions(time, wrench, loads.carrier[near], np.zeros(wrench.shape), cutoff_hz, noise_n)
+    blurred = _blurred(time, wrench, load_bandwidth_hz(loads.time, loads.wrench[..., 1]))
+    return GroundReactions(
+        time, wrench, loads.carrier[near], np.zeros(wrench.shape), cutoff_hz, noise_n, blurred=blurred
+    )
+
+
+def _blurred(time: np.ndarray, wrench: np.ndarray, bandwidth_hz: float | None) -> np.ndarray | float:
+    """Estimate what a filter has taken from loads (k, 2, 6) of this bandwidth."""
+    if bandwidth_hz is None or bandwidth_hz >= BLURRED_HZ:
+        return 0.0
+    result: np.ndarray = _BLURRED_TWICE * (wrench - _low_passed(time, wrench, bandwidth_hz))
+    return result
 
 
 def _noise_left(noise_n: float, rate_hz: float, cutoff_hz: float | None) -> float:

@@ -128,5 +128,5 @@ def _reactions(estimate: GroundReactions, draws: TrialDraws, number: int) -> Gro
     standing = np.ascontiguousarray(estimate.loaded)
     shared = estimate.carrier, departures, np.ascontiguousarray(draws.middles), np.ascontiguousarray(draws.turn)
     impact = corrected_loads(estimate.impact, np.zeros_like(standing), *shared)
-    wrench = corrected_loads(estimate.wrench, standing, *shared) + draws.impact[number] * impact
+    wrench = corrected_loads(estimate.wrench, standing, *shared) + draws.impact[number] * (impact + estimate.blurred)
     return replace(estimate, time=estimate.time - draws.delay_s[number], wrench=wrench, impact=impact)

@@ -45,7 +45,7 @@ def state(problem, coefficients: np.ndarray, static: np.ndarray, with_impact: bo
     dynamic = np.flatnonzero(problem.trials[0].dynamic)
     motion = Motion(*problem.bases[0].evaluate(coefficients)).cut(dynamic)
     reactions, time = problem.loads.reactions(0, static), problem.trials[0].time[dynamic]
-    loads = reactions.at(time) + (reactions.impact_at(time) if with_impact else 0.0)
+    loads = reactions.at(time) + (reactions.uncertain_at(time) if with_impact else 0.0)
     return problem.skeleton.lock(values), problem.model.bsp(static), motion, loads
 
 

@@ -8,7 +8,7 @@ coefficients (`curve_variances`), and is scaled by the observed size of the erro
 where skin motion is not observable (`model_errors`). The delay of the forces counts with its whole distribution
 (`delayed_loads`): at foot contact they change within less than its uncertainty. The part of the forces that is faster
 than the motion (`GroundReactions.impact`) is added as a moving mean square: whether it acts on the joints or
-decelerates segments is unknown.
+decelerates segments is unknown. So is what a filter may have taken from them (`GroundReactions.blurred`).
 """
 
 from __future__ import annotations
@@ -129,7 +129,7 @@ def curve_deviations(
     middle = EndSpread.of_middle(eliminated.middle, root)
     side_by_side(lambda branch: curves.add(branch, root, middle), eliminated.branches)
     variance, around = curves.variance, 1 + 2 * round(_LOST_KNOTS * len(basis.first) / (basis.size - 5))
-    lost = even_mean(np.square(curves.impact), around)
+    lost = even_mean(np.square(curves.uncertain), around)
     variance.moments[:] += lost[:, :c]
     variance.powers[:] += lost[:, :c] * np.square(curves.speed)
     curves.of_joints[:] += lost[:, c:].reshape(curves.of_joints.shape)
@@ -147,7 +147,7 @@ class _Curves:
         frames: (d,) indices of the reported frames.
         grown: (d, r) factors on the corresponding standard deviations of the moments (`model_errors.block_growth`).
         variance: of the curves.
-        impact: (d, r) as in `MomentDerivatives`.
+        uncertain: (d, r) as in `MomentDerivatives`.
         speed: (d, c) of the coordinates.
     """
 
@@ -157,7 +157,7 @@ class _Curves:
     frames: np.ndarray
     grown: np.ndarray
     variance: CurveDeviations
-    impact: np.ndarray
+    uncertain: np.ndarray
     speed: np.ndarray
 
     @property
@@ -186,7 +186,7 @@ class _Curves:
         basis, variance = problem.bases[moments.k], self.variance
         motion = problem.model.full(basis.evaluate(self.coefficients, chosen), moments.static)
         every, c = moments.derivatives(motion, chosen), len(problem.moving)
-        self.impact[rows], self.speed[rows] = every.impact, motion[1][:, problem.moving]
+        self.uncertain[rows], self.speed[rows] = every.uncertain, motion[1][:, problem.moving]
         by, values, in_root = every.rows(slice(0, c)), basis.values[:, chosen], problem.layout.in_root
         known = root[in_root, : root.shape[1] - len(root) + in_root.stop]
         seen = _Seen(by, self.speed[rows], basis.first[chosen], values, self.shares, self.grown[rows, :c])

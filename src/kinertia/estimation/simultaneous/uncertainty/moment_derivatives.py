@@ -73,7 +73,7 @@ class MomentDerivatives:
         value: (d, r) the forces themselves, N m and N.
         q, qd, qdd: (d, r, c) derivatives by the coordinates that move and their rates.
         static: (d, r, s) derivatives by the static unknowns that root equations depend on.
-        impact: (d, r) contribution of impact transients.
+        uncertain: (d, r) contribution of `GroundReactions.uncertain`.
         loads: (d, 2, 6) on right and left foot, N and N m.
         ground: (d, 6, e) derivatives of the ground reactions on right foot, then left (N), by the instruments' errors.
         delay_squares, ground_delay_squares: (d, r), (d, 6) mean squares of the remaining effect of the delay of the
@@ -85,7 +85,7 @@ class MomentDerivatives:
     qd: np.ndarray
     qdd: np.ndarray
     static: np.ndarray
-    impact: np.ndarray
+    uncertain: np.ndarray
     loads: np.ndarray
     ground: np.ndarray
     delay_squares: np.ndarray
@@ -93,7 +93,7 @@ class MomentDerivatives:
 
     def rows(self, some: slice) -> Self:
         """Return these rows."""
-        names = ("value", "q", "qd", "qdd", "static", "impact", "delay_squares")
+        names = ("value", "q", "qd", "qdd", "static", "uncertain", "delay_squares")
         return replace(self, **{name: np.ascontiguousarray(getattr(self, name)[:, some]) for name in names})
 
 
@@ -194,7 +194,7 @@ class MomentsOfTrial:
         by_static[:, :, layout[STILL]] = by_q[:, :, still]
         by_q, by_qd, by_qdd = (part.take(moving, axis=2) for part in (by_q, by_qd, by_qdd))
         value, reach = joints.turned(value[..., None])[..., 0], joints.turned(reach.swapaxes(1, 2)).swapaxes(1, 2)
-        fast = self.reactions.impact_at(time).reshape(len(q), 1, 12)
+        fast = self.reactions.uncertain_at(time).reshape(len(q), 1, 12)
         ground = by_load[:, :, :3, layout.errors].transpose(1, 0, 2, 3).reshape(len(q), 6, -1)
         return MomentDerivatives(
             value,

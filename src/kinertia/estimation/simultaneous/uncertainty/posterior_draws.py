@@ -60,7 +60,7 @@ class TrialDraws:
         middles: (p, 3) m, about which plates are rotated.
         turn: (3, 3) from the laboratory's axes to the trial's.
         delay_s: (n,) additional delay of the forces, s.
-        impact: (n,) share of the impact transients (`GroundReactions.impact`) that is added.
+        impact: (n,) share of `GroundReactions.uncertain`, impact transients among it, that is added.
     """
 
     knots: np.ndarray
