@@ -78,9 +78,9 @@ made in the files of {walks} walks, one at a time, and given to `kinertia check`
   with markers placed on the person. Joint moments change by 5 to 14 N m, more than their SDs, which take a model's
   joints as exact, or with `--calibrate` as known to a centimetre. Nor, with such a model, markers that are 20 mm
   further along the walkway than the plates (7 to 11 N m).
-- Forces that were low-passed at 10 to 15 Hz (-3 dB). Below 10 Hz, P108 reports 95 % of 37 recordings filtered at 8 Hz and
-  60 % of those filtered at 10 Hz, by what contacts lack. Above, a filter cannot be distinguished from somebody who lands
-  softly; moments change by 0.5 to 1.3 SDs at 10 Hz, and at 15 Hz by 0.3 to 0.6.
+- Forces that were low-passed at 10 to 15 Hz (-3 dB). Below 10 Hz, P108 reports 95 % of 37 recordings filtered at 8 Hz
+  and 60 % of those filtered at 10 Hz, by what contacts lack. Above, a filter cannot be distinguished from somebody who
+  lands softly; moments change by 0.2 to 1.6 SDs at 10 Hz, and at 16 Hz by 0.1 to 1.0.
 
 ## What is found in fault-free walks
 
