@@ -6,8 +6,9 @@ import numpy as np
 
 from kinertia.diagnostics.evidence.force_mass import ForceMass
 from kinertia.diagnostics.evidence.segment_distances import LOWER_BODY
+from kinertia.diagnostics.markers import axes_and_floor
 from kinertia.diagnostics.plates.ground_contact import foreign_load
-from kinertia.diagnostics.subject import body_data, movements, standing
+from kinertia.diagnostics.subject import body_data, movements
 from kinertia.diagnostics.subject.body_data import stated_and_filed
 from kinertia.diagnostics.subject.camera_scale import trial_scales
 from kinertia.diagnostics.subject.mass import masses_of_trials, stated_mass
@@ -79,8 +80,8 @@ def recalibrated(ratio):
 
 
 def above_the_floor(height_m, patched):
-    patched.setattr(standing, "_lowest", lambda context, percentile: ("heel", height_m))
-    return standing.floor(SimpleNamespace(static=SimpleNamespace(at=at), trials=()))
+    patched.setattr(axes_and_floor, "_lowest", lambda context, percentile: ("heel", height_m))
+    return axes_and_floor.floor(SimpleNamespace(static=SimpleNamespace(at=at), trials=()))
 
 
 def supporting(share, seconds, complete):

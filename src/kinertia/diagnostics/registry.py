@@ -9,11 +9,11 @@ from kinertia.diagnostics.labels.landmarks import landmarks
 from kinertia.diagnostics.labels.marker_set_match import labels_match
 from kinertia.diagnostics.labels.segment_rigidity import rigidity
 from kinertia.diagnostics.labels.swapped_markers import label_swaps
-from kinertia.diagnostics.markers.axes_and_floor import floor_slope, unit_and_vertical
+from kinertia.diagnostics.markers.axes_and_floor import floor, floor_slope, unit_and_vertical
 from kinertia.diagnostics.markers.computed_markers import computed_markers
 from kinertia.diagnostics.markers.frames import frames
 from kinertia.diagnostics.markers.over_smoothed import over_smoothed
-from kinertia.diagnostics.markers.trajectories import precision, trajectories, visible
+from kinertia.diagnostics.markers.trajectories import absent_markers, precision, trajectories, visible
 from kinertia.diagnostics.model.joint_frames import mirrored_joints, subtalar_axis
 from kinertia.diagnostics.model.length_unit import length_unit
 from kinertia.diagnostics.model.mass_properties import (
@@ -54,19 +54,19 @@ from kinertia.diagnostics.plates.signals import (
     signals,
     spikes,
 )
+from kinertia.diagnostics.plates.stance_coverage import stance_coverage
 from kinertia.diagnostics.plates.zeros import unloaded_levels, zeros, zeros_under_load
 from kinertia.diagnostics.runner import Check
-from kinertia.diagnostics.subject.body_data import absent_markers, population, stated_and_filed, stature
+from kinertia.diagnostics.subject.body_data import population, stated_and_filed, stature
 from kinertia.diagnostics.subject.camera_scale import trial_scales
+from kinertia.diagnostics.subject.interchanged_forces import interchanged_forces
 from kinertia.diagnostics.subject.mass import masses_of_trials, stated_mass
 from kinertia.diagnostics.subject.movements import informative_movements
 from kinertia.diagnostics.subject.same_person import repeated_trials, static_and_trials, trials_of_one_person
-from kinertia.diagnostics.subject.stance_coverage import stance_coverage
-from kinertia.diagnostics.subject.standing import flat_feet, floor, no_static, standing
+from kinertia.diagnostics.subject.standing import flat_feet, no_static, standing
 from kinertia.diagnostics.timing.belt_speed import belt_speed
 from kinertia.diagnostics.timing.file_events import file_events
 from kinertia.diagnostics.timing.force_timing import force_rate, plate_delay, trial_delays
-from kinertia.diagnostics.timing.interchanged_forces import interchanged_forces
 
 MARKER_STATIC_CHECKS: tuple[Check[RecordingContext], ...] = (
     visible,

@@ -12,10 +12,10 @@ from kinertia.diagnostics.labels.marker_set_match import MarkerSetMatch, match_l
 from kinertia.diagnostics.model.model_check import ModelCheck, check_model
 from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.plates.plate_summary import PlateCheck, check_plates
+from kinertia.diagnostics.plates.stance_coverage import coverage_of
 from kinertia.diagnostics.registry import MODEL_CHECKS
 from kinertia.diagnostics.runner import asked, explained, overruled, rules_of
 from kinertia.diagnostics.subject.movements import InformativeMovements, task_of
-from kinertia.diagnostics.subject.stance_coverage import coverage_of
 from kinertia.errors import FileError
 from kinertia.findings.finding import Finding
 from kinertia.findings.overview import Overview

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.subject.body_data import absent_markers, population, stated_and_filed, unobserved_segments
+from kinertia.diagnostics.markers.trajectories import absent_markers
+from kinertia.diagnostics.subject.body_data import population, stated_and_filed, unobserved_segments
 from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
 from kinertia.io.recording import read_recording
 from kinertia.model.gait27 import ARM_COORDINATES, VIRTUAL_TRUNK

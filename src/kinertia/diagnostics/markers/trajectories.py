@@ -18,10 +18,12 @@ from kinertia.diagnostics.evidence.trajectory_faults import (
     spike_limit_m,
     step_limit_m,
 )
+from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.model.marker_set import in_words
 from kinertia.motion.kinematics import LONGEST_BRIDGE_S
 from kinertia.trial.data import Markers
@@ -146,6 +148,21 @@ def _bare_segments(context: RecordingContext) -> Iterator[Finding]:
             expected = ", ".join(labels) or "markers of the model"
             count = Quantity(float(len(labels)), "1")
             yield finding("M104", context.at(part=in_words(segment)), expected=count, labels=Quantity(expected))
+
+
+@check("M105")
+def absent_markers(context: PersonContext) -> Iterator[Finding]:
+    """Report M105: markers of the static trial, or else of the model, that a trial lacks."""
+    if context.marker_set is None:
+        return
+    reference = [label for own in context.marker_set.segments.values() for label in own]
+    if context.model is None:
+        shown = {label for one in context.standing[:1] for label in one.all_markers.labels}
+        reference = [label for label in reference if label in shown]
+    for trial in context.trials:
+        absent = tuple(label for label in reference if label not in trial.all_markers.labels)
+        if absent:
+            yield finding("M105", Where(trial=trial.name, markers=absent), count=Quantity(len(absent), "1"))
 
 
 @check("M131", "M132", unless=needs.LENGTH_UNIT + needs.MEASURED_FRAMES, coarse=COARSE_M, noisy=NOISY_M)

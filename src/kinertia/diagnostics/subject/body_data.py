@@ -73,21 +73,6 @@ def population(context: PersonContext) -> Iterator[Finding]:
         yield assumed
 
 
-@check("M105")
-def absent_markers(context: PersonContext) -> Iterator[Finding]:
-    """Report M105: markers of the static trial, or else of the model, that a trial lacks."""
-    if context.marker_set is None:
-        return
-    reference = [label for own in context.marker_set.segments.values() for label in own]
-    if context.model is None:
-        shown = {label for one in context.standing[:1] for label in one.all_markers.labels}
-        reference = [label for label in reference if label in shown]
-    for trial in context.trials:
-        absent = tuple(label for label in reference if label not in trial.all_markers.labels)
-        if absent:
-            yield finding("M105", Where(trial=trial.name, markers=absent), count=Quantity(len(absent), "1"))
-
-
 def stated_ranges(subject: Subject) -> Iterator[Finding]:
     """Report S411: each joint whose range of motion is stated in the subject file."""
     for name, degrees in (subject.ranges_deg or {}).items():

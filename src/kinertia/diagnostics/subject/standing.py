@@ -1,32 +1,21 @@
-"""Does the static trial show a person who stands on the floor with both feet flat?"""
+"""Is there a static trial, and does it show a person who stands with both feet flat?"""
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.person_context import PersonContext
-from kinertia.diagnostics.plates.plate_height import heights_on_plates
 from kinertia.diagnostics.runner import check
 from kinertia.estimation.simultaneous.instruments.priors import JOINT_CENTRE_SD_M, WITHOUT_STATIC
-from kinertia.findings.finding import Finding, Severity, finding
+from kinertia.findings.finding import Finding, finding
 from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.motion.stance_pose import hidden_landmarks
 from kinertia.trial.marker_quality import LEAST_WALK_M, STANDING_RANGE_M, still_span_s
 
-_LOWEST_M, _HIGHEST_M = Limit(0.005, "m", usual=(0.023, 0.044)), Limit(0.050, "m")
-"""A marker's own radius is 5 mm and more: one beside a small toe was 5.7 mm above the floor. Soles are under both feet,
-and markers on the side of a foot are low.
-
-Usual is what fourteen people of eight laboratories have, barefoot and in running shoes. On top of shoes markers are 53
-to 60 mm above the floor while standing, but 44 to 48 mm in motion.
-"""
 _FLAT_M = Limit(0.04, "m", usual=(0.0, 0.012))
 """Heels, and metatarsals, of seven people who stand are up to 12 mm higher on one side than on the other."""
-_WHILE_STANDING, _IN_MOTION = 50.0, 10.0
-"""Percentiles of a marker's height: in motion it is as high as on standing feet for a part of the time only."""
 
 
 @check("S201", walk=Limit(LEAST_WALK_M, "m"))
@@ -52,52 +41,6 @@ def no_static(context: PersonContext) -> Iterator[Finding]:
     measured = [one.recording for one in context.trials if one.recording.plates is not None]
     if measured and context.marker_set and (hidden := hidden_landmarks(measured[0].markers, context.marker_set)):
         yield finding("S208", landmarks=Quantity(", ".join(hidden)))
-
-
-@check("M143", lowest=_LOWEST_M, highest=_HIGHEST_M)
-def floor(context: PersonContext) -> Iterator[Finding]:
-    """Report M143: feet that stand above or below the floor, by the lowest marker of toes, metatarsals and heels.
-
-    It is an INFO where the trials show the floor, or a plate, at its height: the person then stands on something, or in
-    thick soles.
-    """
-    static = context.static
-    lowest = None if static is None else _lowest(static, _WHILE_STANDING)
-    if static is None or lowest is None:
-        return
-    label, height_m = lowest
-    low, high = _LOWEST_M, _HIGHEST_M
-    if low <= height_m <= high:
-        return
-    in_trials = [own for trial in context.trials for own in _heights_in_motion(trial)]
-    shared = all(own_m < low if height_m < low else own_m > high for own_m in in_trials)
-    height = Quantity(height_m, "m", limit=low if height_m < low else high, usual=_LOWEST_M.usual)
-    found = finding("M143", static.at(markers=(label,)), height_m=height)
-    yield found if shared else replace(found, severity=Severity.INFO)
-
-
-def _heights_in_motion(trial: RecordingContext) -> list[float]:
-    """Return how high (m) the lowest foot marker is above each plate, and above the floor; empty if unknown."""
-    on_plates = [lowest - surface for lowest, surface in heights_on_plates(trial).values()]
-    lowest = _lowest(trial, _IN_MOTION)
-    return [own for own in (*on_plates, *([] if lowest is None else [lowest[1]])) if np.isfinite(own)]
-
-
-def _lowest(context: RecordingContext, percentile: float) -> tuple[str, float] | None:
-    """Return label and height (m) of the lowest foot marker; None where heels or metatarsals are no landmarks."""
-    if context.marker_set is None:
-        return None
-    names = [f"{name}_{side}" for name in ("heel", "metatarsal", "toe") for side in "rl"]
-    of_landmark = [context.marker_set.landmarks.get(name, ()) for name in names]
-    present = context.all_markers.labels
-    labels = list(dict.fromkeys(label for own in of_landmark for label in own if label in present))
-    heights = context.all_markers.select(labels).positions[..., 1]
-    shown = np.isfinite(heights).any(axis=0)
-    if not all(of_landmark[:4]) or not shown.any():
-        return None
-    each = np.where(shown, np.nanpercentile(np.where(shown, heights, 0.0), percentile, axis=0), np.inf)
-    lowest = int(np.argmin(each))
-    return labels[lowest], float(each[lowest])
 
 
 @check("S202", apart=_FLAT_M)

@@ -3,7 +3,7 @@ from dataclasses import replace
 import pytest
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.subject.stance_coverage import coverage_of, stance_coverage
+from kinertia.diagnostics.plates.stance_coverage import coverage_of, stance_coverage
 from kinertia.findings.finding import Severity
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.trial.data import Recording
