@@ -15,8 +15,6 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from kinertia.trial import display
-
 if TYPE_CHECKING:
     __version__: str
 
@@ -149,9 +147,6 @@ _ROOMS = {
 _HOMES = {name: module for module, names in _ROOMS.items() for name in names.split()}
 
 __all__ = sorted(_HOMES)
-
-# data know nothing of reports: what shows and saves them is loaded when it is first asked for
-display.shown_by("kinertia.report.display_registration")
 
 
 if not TYPE_CHECKING:  # a type checker is to know the names above, and no others

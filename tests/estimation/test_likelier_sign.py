@@ -147,7 +147,7 @@ def test_without_free_moments_nothing_is_asked(trial, factor):
 @pytest.mark.parametrize("found", [1.0, -1.0])
 def test_trials_that_cannot_tell_leave_it_open(trial, found, monkeypatch):
     """Estimates with hardly any difference between the signs, whatever was predicted; the turned one comes first."""
-    monkeypatch.setattr(free_moment_sign, "held_against", lambda fitted, other: fitted)
+    monkeypatch.setattr(free_moment_sign, "compared_with", lambda fitted, other: fitted)
     ready, evidence = person(trial, -1.0), iter([Evidence(0.0, 30.0), Evidence(found, None)])
     outcome = with_likelier_sign(ready, lambda *_: Fitted(SimpleNamespace(evidence=next(evidence))))
     assert outcome.ready is ready

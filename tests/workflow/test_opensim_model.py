@@ -107,16 +107,16 @@ def test_loads_act_on_the_heaviest_body_of_each_foot(prepared):
 
 def test_light_bodies_are_held_and_all_are_kept(prepared, model):
     light = [f"{kind}_{side}" for side in "rl" for kind in ("patella", "talus", "toes")]
-    assert prepared.uncertainty.held.segments == (*light, "hand_r", "hand_l")
-    assert set(prepared.prior.mean.segments) | set(prepared.uncertainty.held.segments) == set(model.bsp.segments)
+    assert prepared.uncertainty.fixed.segments == (*light, "hand_r", "hand_l")
+    assert set(prepared.prior.mean.segments) | set(prepared.uncertainty.fixed.segments) == set(model.bsp.segments)
     found = of_code(prepared, "O413")
-    assert tuple(one.where.part for one in found) == prepared.uncertainty.held.segments
+    assert tuple(one.where.part for one in found) == prepared.uncertainty.fixed.segments
     masses = [one.evidence["mass_kg"].value for one in found]
-    assert masses == pytest.approx(prepared.uncertainty.held.mass_kg)
+    assert masses == pytest.approx(prepared.uncertainty.fixed.mass_kg)
     assert max(masses) < 0.5
     for one in found:
         expect_filled(one)
-    assert prepared.prior.mass_kg + prepared.uncertainty.held_kg == pytest.approx(72.6)
+    assert prepared.prior.mass_kg + prepared.uncertainty.fixed_kg == pytest.approx(72.6)
 
 
 def test_of_bodies_that_move_as_one_the_heaviest_is_estimated(other_model):

@@ -22,7 +22,7 @@ import numpy as np
 
 from kinertia.estimation.prepare.prepared import Prepared
 from kinertia.estimation.simultaneous.calibration_entry import POSITION, CalibrationEntry
-from kinertia.estimation.simultaneous.fit import SimultaneousFit, held_against
+from kinertia.estimation.simultaneous.fit import SimultaneousFit, compared_with
 from kinertia.estimation.simultaneous.instruments.instrument_errors import OTHER_SIGN
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
 from kinertia.estimation.simultaneous.mixture_prior import FaultMixture
@@ -84,11 +84,11 @@ def with_likelier_sign(ready: Prepared, fit: Callable[[Prepared, Sequence[Kinema
     kept, used, beside = (fitted, first, instead) if sign.wrong is likely_wrong else (instead, second, fitted)
     if not sign.open:
         return Signed(_with_sign(kept, sign), used)
-    kept, known = held_against(kept, beside), used.uncertainty.instruments
+    kept, known = compared_with(kept, beside), used.uncertainty.instruments
     undisputed = with_undisputed_plates(known, kept.posterior.instrument_errors)
     if undisputed is not known:
         again = fit(replace(used, uncertainty=replace(used.uncertainty, instruments=undisputed)), ())
-        kept = held_against(again, beside)
+        kept = compared_with(again, beside)
     return Signed(_with_sign(kept, sign), used)
 
 

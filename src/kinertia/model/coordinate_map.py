@@ -238,7 +238,7 @@ class CoordinateMap:
         rate = qd[:, self.owner]
         return self._evaluated(q, 0), first * rate, first * qdd[:, self.owner] + second * rate**2
 
-    def bends(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
+    def chain(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
         """Return the dependence (n, a, 3) of every axis on its coordinate, for compiled functions.
 
         It holds the axis' slope, and the derivatives of the axis' rate and acceleration by the coordinate; its shape is
@@ -282,7 +282,7 @@ class CoordinateMap:
         if self.identity:
             return by_axes
         at, rate, acceleration = by_axes
-        slope, of_rate, of_acceleration = np.moveaxis(self.bends(q, qd, qdd)[:, None], -1, 0)
+        slope, of_rate, of_acceleration = np.moveaxis(self.chain(q, qd, qdd)[:, None], -1, 0)
         by_q = at * slope + rate * of_rate + acceleration * of_acceleration
         by_qd = rate * slope + acceleration * (2.0 * of_rate)
         return by_q @ self._sum, by_qd @ self._sum, (acceleration * slope) @ self._sum

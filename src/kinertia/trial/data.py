@@ -20,7 +20,7 @@ from kinertia.errors import MarkerSetError, TrialError
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.trial import display
+from kinertia.trial.display import of_report
 from kinertia.trial.file_contents import Belt, FileEvent, FileOutputs, StatedContact, TorqueColumns
 from kinertia.trial.impossible_data import impossible_markers, impossible_plates
 from kinertia.trial.plate_signals import ForceSpike, UnloadedReading
@@ -251,7 +251,8 @@ class Recording:
 
     def _repr_html_(self) -> str:
         """Return the HTML summary for a notebook: frames, markers and their gaps, force plates, notes."""
-        return display.html(self)
+        html: str = of_report("recording_html")(self)
+        return html
 
 
 @dataclass(frozen=True, eq=False)
@@ -370,7 +371,8 @@ class Trial:
 
     def _repr_html_(self) -> str:
         """Return the HTML summary for a notebook: frames, markers and their gaps, measured windows, notes."""
-        return display.html(self)
+        html: str = of_report("trial_html")(self)
+        return html
 
     def rotated(self, rotation: FloatArray) -> Trial:
         """Return the trial, markers, loads and outputs alike, in axes rotated about the vertical: new = rotation @ old.

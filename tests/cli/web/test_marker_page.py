@@ -12,7 +12,7 @@ pytest.importorskip("uvicorn", reason="needs the extra app (pip install -e '.[te
 from app_server import running
 from kinertia.cli.web.entries import entries, write
 from kinertia.cli.web.library import Library
-from kinertia.cli.web.marker_page import FILE, in_words, marker_places, save_places
+from kinertia.cli.web.marker_page import FILE, in_words, marker_positions, save_places
 from kinertia.errors import KinertiaError, SettingsError
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.subject.reader import read_subject
@@ -40,7 +40,7 @@ def renamed(sample_walk, person, names):
 
 
 def test_a_known_set_has_its_places(person):
-    places = marker_places(person)
+    places = marker_positions(person)
     assert (places.set_name, places.fits, dict(places.missing)) == ("Plug-in Gait", True, {})
     assert sorted(places.unknown) == ["LFIN", "RFIN"]
     assert places.segments["RTHI"] == "thigh_r"
@@ -51,7 +51,7 @@ def test_a_known_set_has_its_places(person):
 
 
 def test_an_unknown_marker_is_assigned_and_the_set_is_the_persons(person):
-    places = marker_places(person)
+    places = marker_positions(person)
     save_places(person, {**places.segments, "LFIN": "forearm_l"}, places.landmarks)
     saved, preset = read_marker_set(person.folder / FILE), read_marker_set("plug-in-gait")
     assert "LFIN" in saved.segments["forearm_l"]
@@ -60,20 +60,20 @@ def test_an_unknown_marker_is_assigned_and_the_set_is_the_persons(person):
     }
     assert saved.widths == preset.widths, "joint widths of the C3D file still count"
     assert read_subject(person.subject).model.markers == (person.folder / FILE).resolve()
-    again = marker_places(person)
+    again = marker_positions(person)
     assert again.unknown == ("RFIN",)
     assert again.fits
 
 
 def test_saving_what_is_there_changes_no_place(person):
-    places = marker_places(person)
+    places = marker_positions(person)
     save_places(person, places.segments, places.landmarks)
-    again = marker_places(person)
+    again = marker_positions(person)
     assert (again.segments, again.landmarks) == (places.segments, places.landmarks)
 
 
 def test_what_makes_no_set_is_said_and_leaves_nothing(person):
-    places = marker_places(person)
+    places = marker_positions(person)
     pelvis = {label: place for label, place in places.segments.items() if place != "pelvis"}
     with pytest.raises(KinertiaError, match="pelvis must list at least three markers"):
         save_places(person, pelvis, places.landmarks)
@@ -84,7 +84,7 @@ def test_what_makes_no_set_is_said_and_leaves_nothing(person):
 def test_places_are_guessed_where_no_set_fits_and_what_lacks_is_listed(person, sample_walk):
     labels = read_trc(sample_walk / "gait2354" / "subject01_static.trc").labels
     renamed(sample_walk, person, {label: f"Q{k:02d}" for k, label in enumerate(labels) if "Thigh" in label})
-    places = marker_places(person)
+    places = marker_positions(person)
     assert not places.unknown or all(label.startswith("Q") for label in places.unknown)
     assert set(places.missing) == {label for label in labels if "Thigh" in label}
 
@@ -93,7 +93,7 @@ def test_markers_of_a_model_are_its_own(person, synthetic_lab):
     for name in ("walk.trc", "scaled.osim"):
         shutil.copyfile(synthetic_lab / name, person.folder / name)
     write(person, {"model": {"osim": "scaled.osim"}, "trial": [{"markers": "walk.trc"}]})
-    places = marker_places(person)
+    places = marker_positions(person)
     assert places.of_model
     with pytest.raises(SettingsError, match="in its file"):
         save_places(person, {}, {})
@@ -107,11 +107,11 @@ def test_the_page_shows_and_saves_them(tmp_path, c3d_lab):
         write(person, {"model": {"static": "static.c3d"}, "trial": [{"markers": "static.c3d"}]})
         page = app.ask("/people/Anna/markers").text
         assert "2 markers have no place" in page
-        places = marker_places(person)
+        places = marker_positions(person)
         form = {f"segment:{label}": place for label, place in {**places.segments, "RFIN": "forearm_r"}.items()}
         form |= {f"landmark:{label}": place for label, place in places.landmarks.items()}
         assert app.post("/people/Anna/markers", urlencode(form)).status == 303
-        assert marker_places(person).unknown == ("LFIN",)
+        assert marker_positions(person).unknown == ("LFIN",)
         refused = app.post("/people/Anna/markers", urlencode({"segment:RFIN": "pelvis"}))
         assert refused.status == 422
         assert "pelvis must list at least three markers" in refused.text

@@ -34,7 +34,7 @@ _HEADING = "# Written by kinertia app; name it under [model] markers or with --m
 
 
 @dataclass(frozen=True, eq=False)
-class MarkerPlaces:
+class MarkerPositions:
     """Markers of one recording and their assignment to segments and landmarks.
 
     Attributes:
@@ -64,7 +64,7 @@ class MarkerPlaces:
         return tuple(label for label in self.labels if label not in self.segments)
 
 
-def marker_places(person: PersonFolder) -> MarkerPlaces:
+def marker_positions(person: PersonFolder) -> MarkerPositions:
     """Read the markers of the static trial, or of the first other recording.
 
     Raises:
@@ -83,7 +83,7 @@ def marker_places(person: PersonFolder) -> MarkerPlaces:
         placed = places_of(recording)
         places = {"s": dict(_owners(placed.segments)), "l": dict(_owners(placed.landmarks))}
     here = set(markers.labels)
-    return MarkerPlaces(
+    return MarkerPositions(
         path.name,
         markers.labels,
         _fullest_frame(markers),
@@ -106,7 +106,7 @@ def save_places(person: PersonFolder, segments: Mapping[str, str], landmarks: Ma
     Raises:
         KinertiaError: they make no valid marker set; then nothing is changed.
     """
-    places = marker_places(person)
+    places = marker_positions(person)
     if places.of_model:
         raise SettingsError("the markers of an OpenSim model are assigned in its file")
     before = _named_set(person, _table(entries(person).get("model")))
@@ -211,9 +211,9 @@ def marker_routes(library: Library, jobs: Jobs) -> list[BaseRoute]:
 def _page(
     request: Request, person: PersonFolder, problem: str = "", given: Mapping[str, str] | None = None
 ) -> Response:
-    places: MarkerPlaces | None = None
+    places: MarkerPositions | None = None
     try:
-        places = marker_places(person)
+        places = marker_positions(person)
     except KinertiaError as error:
         problem = problem or str(error)
     rows = [] if places is None else _rows(places, given or {})
@@ -238,7 +238,7 @@ def in_words(name: str) -> str:
     return side + (name[:-2] if side else name).replace("_", " ")
 
 
-def _rows(places: MarkerPlaces, given: Mapping[str, str]) -> list[dict[str, str]]:
+def _rows(places: MarkerPositions, given: Mapping[str, str]) -> list[dict[str, str]]:
     """List every label with its place, those without first."""
     rows = [
         {
@@ -251,7 +251,7 @@ def _rows(places: MarkerPlaces, given: Mapping[str, str]) -> list[dict[str, str]
     return sorted(rows, key=lambda row: bool(row["segment"]))
 
 
-def _scene(places: MarkerPlaces, rows: list[dict[str, str]]) -> list[dict[str, Any]]:
+def _scene(places: MarkerPositions, rows: list[dict[str, str]]) -> list[dict[str, Any]]:
     """Return the content of the figure: labels with positions in mm about the middle of the body."""
     seen = np.isfinite(places.positions).all(axis=1)
     middle = places.positions[seen].mean(axis=0) if seen.any() else np.zeros(3)

@@ -35,7 +35,7 @@ from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.imported_model import OsimModel
 from kinertia.model.skeleton import Skeleton
 from kinertia.settings import Settings, Subject
-from kinertia.trial import display
+from kinertia.trial.display import of_report
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -228,7 +228,8 @@ class Fit:
         Raises:
             FileError: the folder holds such files, or cannot be written to.
         """
-        return display.save(self, folder, force=force)
+        written: Path = of_report("save_fit")(self, folder, force=force)
+        return written
 
     def figure(self, name: str, path: str | Path, trial: str | None = None) -> Path:
         """Draw a figure for a paper into a file (180 mm wide, three panels in a row), and return the file.
@@ -244,7 +245,8 @@ class Fit:
                 `plots`) is missing.
             FileError: the format is not known, or the file cannot be written.
         """
-        return display.figure(self, name, path, trial)
+        written: Path = of_report("save_figure")(self, name, path, trial)
+        return written
 
     def to_xarray(self, kind: Kind = "moment", over: Literal["percent", "time"] = "percent") -> Dataset:
         """Return curves of all trials as an xarray Dataset with variables `value` and `sd`, units as their attributes.
@@ -264,7 +266,7 @@ class Fit:
             >>> knee.value.attrs["units"]
             'N m/kg'
         """
-        return display.dataset(self, kind, over)
+        return of_report("curve_dataset")(self, kind, over)
 
     def gps(self, norms: str | Path) -> GaitProfile:
         """Compute Gait Profile Score and Movement Analysis Profile (Baker 2009) against norms, in degrees.
@@ -276,7 +278,7 @@ class Fit:
             KinertiaError: norms have another convention or lack a variable, or there are no strides.
             FileError: the norms cannot be read.
         """
-        result: GaitProfile = display.gait_profile(self, norms)
+        result: GaitProfile = of_report("scored")(self, norms)
         return result
 
     def draws_to_xarray(self, count: int = 50, seed: int = 0) -> Dataset:
@@ -293,7 +295,7 @@ class Fit:
         Raises:
             KinertiaError: xarray is missing, or fewer draws are stored.
         """
-        return display.draws(self, count, seed)
+        return of_report("draw_dataset")(self, count, seed)
 
     @property
     def covariance(self) -> pd.DataFrame | None:
@@ -332,7 +334,7 @@ class Fit:
     @property
     def plot(self) -> FitPictures:
         """Figures for a notebook: `fit.plot.moments()`, `.bsp()`, `.residuals()`, `.skeleton()` and others."""
-        pictures: FitPictures = display.pictures(self)
+        pictures: FitPictures = of_report("pictures")(self)
         return pictures
 
     def __repr__(self) -> str:
@@ -342,4 +344,5 @@ class Fit:
 
     def _repr_html_(self) -> str:
         """Return the HTML summary for a notebook: verdict, warnings, body segment parameters."""
-        return display.html(self)
+        html: str = of_report("fit_html")(self)
+        return html

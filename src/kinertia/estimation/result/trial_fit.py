@@ -19,7 +19,7 @@ from kinertia.motion.dynamics import Motion
 from kinertia.motion.gait_cycle import Stride, contact_phases, strides_of
 from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.kinematics import Kinematics
-from kinertia.trial import display
+from kinertia.trial.display import of_report
 from kinertia.trial.trial_input import WITHOUT_STRIDES
 
 if TYPE_CHECKING:
@@ -235,7 +235,8 @@ class TrialFit:
 
     def _repr_html_(self) -> str:
         """Return the HTML summary for a notebook: frames used, marker distances, residuals."""
-        return display.html(self)
+        html: str = of_report("trial_fit_html")(self)
+        return html
 
 
 def by_coordinate(kinematics: Kinematics, values: np.ndarray) -> pd.DataFrame:

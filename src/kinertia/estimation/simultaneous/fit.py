@@ -224,7 +224,7 @@ def _posterior(
     )
 
 
-def held_against(fitted: SimultaneousFit, other: SimultaneousFit) -> SimultaneousFit:
+def compared_with(fitted: SimultaneousFit, other: SimultaneousFit) -> SimultaneousFit:
     """Mark errors that only one of two equally likely interpretations of the trials supports as contradicted."""
     elsewhere = {one.key: one.supported for one in other.posterior.calibration}
     calibration = tuple(
@@ -238,7 +238,7 @@ def used_skeleton(skeleton: Skeleton, trials: Sequence[Kinematics], uncertainty:
     """Return the skeleton with the markers that any of the trials has, and with the segments that are fixed."""
     shown = {label for k in trials for label in k.ik.labels}
     used = skeleton.with_markers([marker for marker in skeleton.markers if marker.label in shown])
-    return used.carrying(uncertainty.held)
+    return used.carrying(uncertainty.fixed)
 
 
 def observed(
@@ -249,7 +249,7 @@ def observed(
     uncertainty: ModelUncertainty,
 ) -> Observations:
     """Return the observations that the estimate uses, from trials of a `used_skeleton`."""
-    return observe(skeleton, trials, prior.mass_kg + uncertainty.held_kg, bandwidths)
+    return observe(skeleton, trials, prior.mass_kg + uncertainty.fixed_kg, bandwidths)
 
 
 def calibration_prior(

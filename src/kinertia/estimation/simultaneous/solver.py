@@ -124,7 +124,7 @@ def estimate_simultaneous(
     known = AdaptedPrior.elsewhere(ended.instruments)
     phases, profile = both(
         lambda: OfPhases.of(problem, ended.point, partial(_continued, adapted=known)),
-        lambda: CostProfile.of(model, ended.instruments, ended.point, partial(_held, problem)),
+        lambda: CostProfile.of(model, ended.instruments, ended.point, partial(_with_fixed_delay, problem)),
     )
     there = ended._replace(here=profile.here, instruments=profile.instruments)
     model = GaussNewton.of(problem, there.here).under(there.instruments)
@@ -180,7 +180,7 @@ def _searched(problem: MapProblem, progress: Callable[[float], None]) -> Ended:
         begin = here.slope.cost if iterations == 1 else begin
         scale = np.maximum(scale, np.diag(here.information) + sum(trial.static_diagonal for trial in here.trials))
         static = here.point.like(here.slope.rhs).static
-        model = GaussNewton.of(problem, here, damping * scale + problem.bends(static))
+        model = GaussNewton.of(problem, here, damping * scale + problem.second_derivatives(static))
         progress(iterations / (iterations + max(_USUAL_ITERATIONS - iterations, _LEFT_ITERATIONS)))
         if last:
             end = _last_step(problem, model, at)
@@ -223,14 +223,14 @@ def _continued(problem: MapProblem, point: Point, adapted: AdaptedPrior) -> Poin
     at = _descended(problem, alone, alone.here.slope, adapted, False, _CONTINUED, 1)
     for _ in range(_MOST_CONTINUED):
         here = problem.at(at.point, _LEAST_DAMPING)
-        model = GaussNewton.of(problem, here, problem.bends(here.point.like(here.slope.rhs).static))
+        model = GaussNewton.of(problem, here, problem.second_derivatives(here.point.like(here.slope.rhs).static))
         at = _descended(problem, model, here.slope, at.adapted, True, _CONTINUED)
         if at.converged:
             break
     return at.point
 
 
-def _held(
+def _with_fixed_delay(
     problem: MapProblem, model: GaussNewton, slope: Slope, instruments: GaussianPrior
 ) -> tuple[np.ndarray, float]:
     """Return the static unknowns (S,) and the cost at the optimum with this Gaussian for the instruments.

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from kinertia.estimation.simultaneous.fit import held_against
+from kinertia.estimation.simultaneous.fit import compared_with
 from kinertia.estimation.simultaneous.instruments.priors import (
     DELAY_PRIOR_S,
     FLOOR_PRIOR,
@@ -63,8 +63,8 @@ def test_a_wrong_gain_is_named(trial, plain):
     assert entry.sd < 0.012
     assert outcome.posterior.missing_loads == ()
 
-    assert held_against(outcome, outcome).posterior.calibration == outcome.posterior.calibration
-    alone = held_against(outcome, plain)
+    assert compared_with(outcome, outcome).posterior.calibration == outcome.posterior.calibration
+    alone = compared_with(outcome, plain)
     assert [one for one in outcome.posterior.calibration if one.supported] == [entry]
     assert not any(one.supported for one in alone.posterior.calibration)
     assert entry_of(alone, "gain", **where).contradicted_by

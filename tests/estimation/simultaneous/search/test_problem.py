@@ -270,8 +270,8 @@ def test_bends_are_what_gauss_newton_leaves_out(problem, here, place):
         return place.like(problem.slope(place).rhs).static
 
     informed = problem.prior_information(static) + problem.normal(0, coefficients, static).static
-    bends = problem.bends(rhs(static))
-    assert (bends[rows] >= 0.0).all()
+    second = problem.second_derivatives(rhs(static))
+    assert (second[rows] >= 0.0).all()
     pulled = [row for row in rows if rhs(static)[row] < 0.0]
     assert pulled
     step = 1e-5
@@ -280,6 +280,6 @@ def test_bends_are_what_gauss_newton_leaves_out(problem, here, place):
         change[row] = step
         second = -(rhs(static + change)[row] - rhs(static - change)[row]) / (2.0 * step)
         left_out = second - (informed[row, row] - LEAST_INFORMATION)
-        assert bends[row] == pytest.approx(left_out, rel=1e-3)
+        assert second[row] == pytest.approx(left_out, rel=1e-3)
     others = [row for row in rows if rhs(static)[row] > 0.0]
-    np.testing.assert_array_equal(bends[others], 0.0)
+    np.testing.assert_array_equal(second[others], 0.0)

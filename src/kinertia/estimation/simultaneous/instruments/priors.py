@@ -246,7 +246,7 @@ class ModelUncertainty:
     Attributes:
         centres: static coordinate of the skeleton (locked) -> prior standard deviation, m.
         marker_sd_m: prior standard deviation of marker positions in their segments, each axis; None: they are fixed.
-        held: parameters of the segments that are not in the prior; None if it has all.
+        fixed: parameters of the segments that are not in the prior; None if it has all.
         source: where the prior's mean comes from, for messages.
         axes: static coordinate that tilts a joint's axis -> prior standard deviation, rad.
         instruments: priors of plates and synchronisation.
@@ -255,7 +255,7 @@ class ModelUncertainty:
 
     centres: Mapping[str, float]
     marker_sd_m: float | None
-    held: BodySegmentParameters | None
+    fixed: BodySegmentParameters | None
     source: str
     axes: Mapping[str, float] = field(default_factory=dict)
     instruments: InstrumentPrior = field(default_factory=InstrumentPrior)
@@ -271,20 +271,20 @@ class ModelUncertainty:
         return replace(self, axes=dict.fromkeys(AXIS_TILTS, JOINT_AXIS_SD_RAD))
 
     @property
-    def held_kg(self) -> float:
+    def fixed_kg(self) -> float:
         """Mass (kg) of the segments that are not estimated."""
-        return 0.0 if self.held is None else self.held.total_mass_kg
+        return 0.0 if self.fixed is None else self.fixed.total_mass_kg
 
     def whole(self, estimate: BodySegmentParameters) -> BodySegmentParameters:
         """Append the segments that are not estimated to the estimate."""
-        if self.held is None:
+        if self.fixed is None:
             return estimate
-        table = np.concatenate([estimate.table(), self.held.table()])
-        return BodySegmentParameters.from_table((*estimate.segments, *self.held.segments), table)
+        table = np.concatenate([estimate.table(), self.fixed.table()])
+        return BodySegmentParameters.from_table((*estimate.segments, *self.fixed.segments), table)
 
     def whole_covariance(self, covariance: np.ndarray) -> np.ndarray:
         """Return the covariance (10 s, 10 s) in the order of `whole`, zero for segments that are not estimated."""
-        return np.pad(covariance, (0, 0 if self.held is None else 10 * len(self.held.segments)))
+        return np.pad(covariance, (0, 0 if self.fixed is None else 10 * len(self.fixed.segments)))
 
 
 GAIT27_UNCERTAINTY = ModelUncertainty(

@@ -17,7 +17,7 @@ from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, Gaussian
 from kinertia.estimation.simultaneous.search.gauss_newton import GaussNewton
 from kinertia.estimation.simultaneous.search.linearised import Linearised, Point, Slope
 
-_HELD = 1e6
+_FIXING = 1e6
 """Information that fixes the delay where the profile is evaluated, relative to what is known of it."""
 
 
@@ -63,9 +63,9 @@ class CostProfile:
         known = np.linalg.inv(across[late])
         sd = float(np.sqrt(across[late].sum()))
         delays = np.array([-sd, 0.0, sd])
-        held = [_held(instruments, own, values + away / len(own), _HELD / sd**2) for away in delays]
+        fixed = [_fixed(instruments, own, values + away / len(own), _FIXING / sd**2) for away in delays]
         slope = problem.slope(point)
-        costs = [_without(each, own, *search(model, slope, each), first) for each in held]
+        costs = [_without(each, own, *search(model, slope, each), first) for each in fixed]
         curve, slope, _ = np.polyfit(delays, costs, 2)
         if not curve > 0.0:
             return unchanged
@@ -89,7 +89,7 @@ def _without(gaussian: GaussianPrior, own: np.ndarray, static: np.ndarray, cost:
     return cost - alone.cost(static[first + own])
 
 
-def _held(gaussian: GaussianPrior, own: np.ndarray, values: np.ndarray, information: float) -> GaussianPrior:
+def _fixed(gaussian: GaussianPrior, own: np.ndarray, values: np.ndarray, information: float) -> GaussianPrior:
     """Return the Gaussian with some quantities fixed at these values by this much information on each."""
     return _with(gaussian, own, information * np.eye(len(own)), information * values)
 

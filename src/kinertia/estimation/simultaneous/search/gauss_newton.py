@@ -57,14 +57,14 @@ class GaussNewton:
     static: StaticInformation
 
     @classmethod
-    def of(cls, problem: MapProblem, here: Linearised, held: np.ndarray | float = 0.0) -> Self:
-        """Build it at a point, with the diagonal of the information on the static unknowns raised by `held` (S,)."""
+    def of(cls, problem: MapProblem, here: Linearised, damping: np.ndarray | float = 0.0) -> Self:
+        """Build it at a point, with the diagonal of the information on the static unknowns raised by `damping` (S,)."""
         places, information = problem.layout.displaced, here.information.copy()
         trials = zip(here.trials, problem.displaced_sd, strict=True)
         displaced = tuple(Displaced.of(trial.information, places, sd) for trial, sd in trials)
         for each in displaced:
             information += each.information
-        information[np.diag_indices_from(information)] += held
+        information[np.diag_indices_from(information)] += damping
         rest = StaticInformation.of(information, problem.layout.in_root.stop)
         return cls(problem, here, displaced, rest, rest)
 

@@ -102,11 +102,11 @@ class MapProblem:
             term.shorten(step)
         return step
 
-    def bends(self, rhs: np.ndarray) -> np.ndarray:
+    def second_derivatives(self, rhs: np.ndarray) -> np.ndarray:
         """Return what Gauss-Newton leaves out of the information's diagonal (S,), from the right-hand side (S,)."""
         result = np.zeros(self.layout.size)
         for term in self.terms:
-            term.add_bends(result, rhs)
+            term.add_second_derivatives(result, rhs)
         return result
 
     def prior_information(self, static: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ With the symbols of `simultaneous`, half of the following is added to the cost; 
     `JointRanges`        sum over knots of (excess of q over its range / sd)^2, rounded off at the limit
     `Start`              (c - c_start)^2 / away^2 + differences of neighbours of it / change^2
     `StaticCoordinates`  (s / sd)^2 of joint centres and tilts of axes, on which x and r depend
-    `MarkerPlaces`       (l - l0)^2 / sd^2 of positions l in the segments, and d^2 of a trial's displacements sd d
+    `MarkerPositions`       (l - l0)^2 / sd^2 of positions l in the segments, and d^2 of a trial's displacements sd d
     `Skin`               |C|^2 of coefficients by which skin follows the joints (`skin`)
     `InstrumentErrors`   -2 log of the mixture priors of the errors on which f depends (`mixture_prior`)
     `MissingLoads`       the same of shares of the load that no plate measured

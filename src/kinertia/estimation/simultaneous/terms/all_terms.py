@@ -1,7 +1,7 @@
 """Lists the cost terms of the simultaneous estimate. A new unknown is a new term."""
 
 from kinertia.estimation.simultaneous.terms.bsp_term import BodySegments, TaskMasses
-from kinertia.estimation.simultaneous.terms.calibration_terms import MarkerPlaces, Skin, StaticCoordinates
+from kinertia.estimation.simultaneous.terms.calibration_terms import MarkerPositions, Skin, StaticCoordinates
 from kinertia.estimation.simultaneous.terms.cost_term import CostTerm
 from kinertia.estimation.simultaneous.terms.instrument_term import InstrumentErrors, MissingLoads
 from kinertia.estimation.simultaneous.terms.marker_terms import Markers
@@ -13,7 +13,7 @@ TERMS: tuple[type[CostTerm], ...] = (
     InstrumentErrors,
     MissingLoads,
     TrunkBending,
-    MarkerPlaces,
+    MarkerPositions,
     Skin,
     BodySegments,
     TaskMasses,

@@ -72,7 +72,7 @@ class BodySegments(CostTerm):
         """Limit the change of every logarithm to one."""
         step[self._logs] = np.clip(step[self._logs], -1.0, 1.0)
 
-    def add_bends(self, into: np.ndarray, rhs: np.ndarray) -> None:
+    def add_second_derivatives(self, into: np.ndarray, rhs: np.ndarray) -> None:
         """Add second derivatives by logarithms that Gauss-Newton leaves out, where the cost falls with the logarithm.
 
         The data may favour a mass or a second moment below zero. Towards zero the first derivatives vanish, and with

@@ -21,7 +21,7 @@ from kinertia.estimation.simultaneous.terms.cost_term import CostTerm, Solution
 from kinertia.model.neutral_joints import joint_and_axis
 
 
-class MarkerPlaces(CostTerm):
+class MarkerPositions(CostTerm):
     """Positions of the markers in their segments; with several trials each has displacements of its own."""
 
     order: ClassVar[int] = 40

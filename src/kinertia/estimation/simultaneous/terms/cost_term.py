@@ -86,7 +86,7 @@ class CostTerm:
         """Add minus the derivatives (S,) of half the sum of squares of its own prior; return the sum."""
         return 0.0
 
-    def add_bends(self, into: np.ndarray, rhs: np.ndarray) -> None:
+    def add_second_derivatives(self, into: np.ndarray, rhs: np.ndarray) -> None:
         """Add what Gauss-Newton leaves out to the diagonal (S,) of the information, from the right-hand side (S,)."""
 
     def shorten(self, step: np.ndarray) -> None:

@@ -61,7 +61,7 @@ def root_columns(
     gravity_m_s2: float,
     bodies: Float2,
     motion: tuple[Float2, Float2, Float2],
-    bends: Float3,
+    by_coordinate: Float3,
     root: tuple[Float2, Float2],
     wrench: Float2,
     chain: Float3,
@@ -76,7 +76,7 @@ def root_columns(
     Args:
         tree, gravity_m_s2, bodies: as in `axis_forces`.
         motion: (n, a) values, rates and accelerations of the axes.
-        bends: (n, a, 3) dependence of axes on their coordinates, `CoordinateMap.bends`; n is 0 if each axis is its
+        by_coordinate: (n, a, 3) dependence of axes on coordinates, `CoordinateMap.chain`; n is 0 if each axis is its
             coordinate.
         root: (n, 3) m, point about which moments are taken, and (3, 3) directions in which the first three coordinates
             move it, in rows.
@@ -103,8 +103,8 @@ def root_columns(
         for j in range(count):
             for order in range(3):
                 taken_about(frame.column[order, j], about[i], column[order])
-            if len(bends):
-                _bend_columns(column, bends[i, j])
+            if len(by_coordinate):
+                _columns_by_coordinate(column, by_coordinate[i, j])
             if columns.still[j] >= 0:
                 for r in range(6):
                     static[i, r, columns.still[j]] += column[0, r]
@@ -133,13 +133,13 @@ def _over_deviations(sd: np.ndarray, i: int, left: np.ndarray, static: np.ndarra
 
 
 @part
-def _bend_columns(column: np.ndarray, bend: np.ndarray) -> None:
+def _columns_by_coordinate(column: np.ndarray, chain: np.ndarray) -> None:
     """Convert derivatives (3, 6) by an axis' value, rate and acceleration to those by its coordinate's."""
     for r in range(6):
         place, rate, acceleration = column[0, r], column[1, r], column[2, r]
-        column[0, r] = place * bend[0] + rate * bend[1] + acceleration * bend[2]
-        column[1, r] = rate * bend[0] + acceleration * 2.0 * bend[1]
-        column[2, r] = acceleration * bend[0]
+        column[0, r] = place * chain[0] + rate * chain[1] + acceleration * chain[2]
+        column[1, r] = rate * chain[0] + acceleration * 2.0 * chain[1]
+        column[2, r] = acceleration * chain[0]
 
 
 @part
@@ -208,7 +208,7 @@ def add_root_gradient(
     gravity_m_s2: float,
     bodies: Float2,
     motion: tuple[Float2, Float2, Float2],
-    bends: Float3,
+    by_coordinate: Float3,
     root: tuple[Float2, Float2],
     wrench: Float2,
     sd: Float2,
@@ -220,7 +220,7 @@ def add_root_gradient(
     """Add minus the gradient of half the sum of squares by the motion (size, c) and by static coordinates (S,).
 
     Args:
-        tree, gravity_m_s2, bodies, motion, bends, root, wrench, sd, columns: as in `root_columns`.
+        tree, gravity_m_s2, bodies, motion, by_coordinate, root, wrench, sd, columns: as in `root_columns`.
         basis: (n,) the first active spline of each frame among those of `rhs`, and (3, n, 6) values of the active
             ones and their first two derivatives.
         rhs, static_rhs: arrays to which it is added.
@@ -253,8 +253,8 @@ def add_root_gradient(
         _of_bodies(tree.parent, bodies, frame, by_ground, k)
         _by_axes(frame, by_ground, k, by)
         for j in range(count):
-            if len(bends):
-                _bend_gradient(by[j], bends[k, j])
+            if len(by_coordinate):
+                _gradient_by_coordinate(by[j], by_coordinate[k, j])
             if columns.still[j] >= 0:
                 static_rhs[columns.still[j]] -= by[j, 0]
             if columns.moving[j] >= 0:
@@ -322,12 +322,12 @@ def _by_axes(frame: Frame, pulls: np.ndarray, k: int, by: np.ndarray) -> None:
 
 
 @part
-def _bend_gradient(by: np.ndarray, bend: np.ndarray) -> None:
+def _gradient_by_coordinate(by: np.ndarray, chain: np.ndarray) -> None:
     """Convert the gradient (3,) by an axis' value, rate and acceleration to that by its coordinate's."""
     place, rate, acceleration = by[0], by[1], by[2]
-    by[0] = place * bend[0] + rate * bend[1] + acceleration * bend[2]
-    by[1] = rate * bend[0] + acceleration * 2.0 * bend[1]
-    by[2] = acceleration * bend[0]
+    by[0] = place * chain[0] + rate * chain[1] + acceleration * chain[2]
+    by[1] = rate * chain[0] + acceleration * 2.0 * chain[1]
+    by[2] = acceleration * chain[0]
 
 
 @part

@@ -149,7 +149,7 @@ class RootFrames:
             skeleton.gravity_m_s2,
             skeleton.bodies(self.bsp),
             axis_motion(skeleton, motion),
-            skeleton.map.bends(motion.q, motion.qd, motion.qdd),
+            skeleton.map.chain(motion.q, motion.qd, motion.qdd),
             (np.ascontiguousarray(skeleton.root.centre(motion.q)), skeleton.root.moves),
         )
 

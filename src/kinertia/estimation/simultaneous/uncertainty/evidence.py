@@ -194,7 +194,7 @@ def _shown(problem: MapProblem, point: Point) -> _Shown:
             static[other.layout[name]] = point.static[at]
     point = replace(point, static=static)
     here, gaussian = other.at(point), GaussianPrior.of(other.layout.error_priors)
-    model = GaussNewton.of(other, here, other.bends(point.like(here.slope.rhs).static)).under(gaussian)
+    model = GaussNewton.of(other, here, other.second_derivatives(point.like(here.slope.rhs).static)).under(gaussian)
     mean, covariance = model.of_instruments(point, model.step(here.slope.under(gaussian)[1]))
     after = np.linalg.inv(covariance)
     return _Shown(other, after - gaussian.precision, after @ mean - gaussian.pull)

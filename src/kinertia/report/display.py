@@ -1,19 +1,23 @@
-"""Registers with `kinertia.trial.display` how trials and fits are shown and saved; loaded at the first use."""
+"""Shows and saves trials and fits: what their methods ask for through `kinertia.trial.display`."""
+
+from pathlib import Path
+from typing import Any
 
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.gait_profile import gait_profile
+from kinertia.estimation.result.gait_scores import GaitProfile
 from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.findings.finding import Severity
 from kinertia.io.norms_file import read_norms
-from kinertia.report.exports.datasets import curve_dataset, draw_dataset
-from kinertia.report.exports.files import save_fit
-from kinertia.report.figures.journal_figure import save_figure
+from kinertia.report.exports.datasets import curve_dataset as curve_dataset
+from kinertia.report.exports.datasets import draw_dataset as draw_dataset
+from kinertia.report.exports.files import save_fit as save_fit
+from kinertia.report.figures.journal_figure import save_figure as save_figure
 from kinertia.report.figures.plots import FitFigures, as_plotly
 from kinertia.report.pages.finding_view import lines
 from kinertia.report.pages.page import bsp_rows, residual_rows
 from kinertia.report.pages.rendering import rendered
 from kinertia.report.wording import start_of
-from kinertia.trial import display
 from kinertia.trial.data import LOAD_THRESHOLD_N, Markers, Recording, Trial
 from kinertia.trial.sampled_data import rms
 
@@ -74,31 +78,11 @@ def _gappy(markers: Markers) -> list[tuple[str, float]]:
     return sorted(shares, key=lambda item: item[1])
 
 
-display.html.register(Recording, recording_html)
+def pictures(fit: Fit) -> FitFigures[Any]:
+    """Return the figures of a fit, one method for each, for plotly."""
+    return FitFigures(fit, as_plotly)
 
 
-display.html.register(Trial, trial_html)
-
-
-display.html.register(TrialFit, trial_fit_html)
-
-
-display.html.register(Fit, fit_html)
-
-
-display.pictures.register(Fit, lambda fit: FitFigures(fit, as_plotly))
-
-
-display.save.register(Fit, save_fit)
-
-
-display.figure.register(Fit, save_figure)
-
-
-display.dataset.register(Fit, curve_dataset)
-
-
-display.draws.register(Fit, draw_dataset)
-
-
-display.gait_profile.register(Fit, lambda fit, norms: gait_profile(fit, read_norms(norms)))
+def scored(fit: Fit, norms: str | Path) -> GaitProfile:
+    """Compute gait scores of a fit against the norms in a file."""
+    return gait_profile(fit, read_norms(norms))
