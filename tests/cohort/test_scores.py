@@ -8,7 +8,7 @@ import pytest
 from kinertia.cohort.page import score_parts
 from kinertia.cohort.record import Place, Record
 from kinertia.cohort.tables import write_person, write_tables
-from kinertia.estimation.result.gait_profile import gait_profile
+from kinertia.estimation.result.mean_cycles import gait_profile
 from kinertia.io.norms_file import Norm
 from kinertia.io.versions import VERSION
 from kinertia.motion.model_outputs import CLINICAL_ANGLES

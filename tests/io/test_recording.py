@@ -15,7 +15,7 @@ from kinertia.io.recording import read_recording
 from kinertia.io.text.sto import write_sto
 from kinertia.io.text.trc import write_trc
 from kinertia.trial.data import Markers
-from kinertia.trial.plate_names import with_plates_of_trial
+from kinertia.trial.trial_input import with_plates_of_trial
 from refusals import codes, expect_evidence, only, refused
 
 

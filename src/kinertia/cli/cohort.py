@@ -35,7 +35,7 @@ from kinertia.cohort.record import Record, Standing, keep, prepare_folder, stand
 from kinertia.cohort.tables import write_tables
 from kinertia.cohort.worker import fit_person
 from kinertia.errors import SettingsError
-from kinertia.estimation.result.gait_profile import expect_all_nine
+from kinertia.estimation.result.mean_cycles import expect_all_nine
 from kinertia.io.norms_file import Norm, read_norms
 from kinertia.io.results.working_folder import sole_use
 

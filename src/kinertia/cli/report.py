@@ -11,8 +11,8 @@ from kinertia.cli.terminal import out
 from kinertia.errors import FileError
 from kinertia.estimation.result.cycles import columns_of
 from kinertia.estimation.result.fit import Fit
-from kinertia.estimation.result.gait_profile import check_convention, gait_profile
 from kinertia.estimation.result.gait_scores import with_norms
+from kinertia.estimation.result.mean_cycles import check_convention, gait_profile
 from kinertia.io.norms_file import Norm, read_norms
 from kinertia.io.results.output_folder import updated_files
 from kinertia.motion.model_outputs import CLINICAL_ANGLES

@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import Any
 
 from kinertia.estimation.result.fit import Fit
-from kinertia.estimation.result.gait_profile import gait_profile
 from kinertia.estimation.result.gait_scores import GaitProfile
+from kinertia.estimation.result.mean_cycles import gait_profile
 from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.findings.finding import Severity
 from kinertia.io.norms_file import read_norms

@@ -27,7 +27,7 @@ from kinertia.estimation.simultaneous.fit import calibration_prior, observed, us
 from kinertia.estimation.simultaneous.inputs import BSP
 from kinertia.estimation.simultaneous.instruments.priors import GAIT27_UNCERTAINTY, ModelUncertainty
 from kinertia.estimation.simultaneous.linear_algebra.motion_basis import Bandwidth
-from kinertia.estimation.simultaneous.linear_algebra.static_information import StaticInformation
+from kinertia.estimation.simultaneous.linear_algebra.normal_equations import StaticInformation
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.search.problem import MapProblem
 from kinertia.estimation.simultaneous.terms.calibration_terms import as_displaced

@@ -21,7 +21,6 @@ import numpy as np
 import pandas as pd
 
 from kinertia.errors import TrialError
-from kinertia.io.c3d.writer import write_c3d
 from kinertia.io.results.output_folder import complete_folder
 from kinertia.io.text.sto import write_sto
 from kinertia.io.text.trc import write_trc
@@ -163,6 +162,8 @@ def write_lab(folder: str | Path, recordings: LabRecordings, kind: Literal["trc"
 
     "trc": `static.trc`, `walk.trc`, `walk_grf.mot`. "c3d": `static.c3d`, `walk.c3d`, with Z up and mm.
     """
+    from kinertia.io.c3d.writer import write_c3d  # takes a while to load, and studies only need the errors
+
     files = [("static", recordings.static), ("walk", recordings.walk)]
     with complete_folder(folder, "lab") as work:
         for name, recording in files:

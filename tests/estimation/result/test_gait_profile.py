@@ -7,9 +7,16 @@ import pandas as pd
 import pytest
 
 from kinertia.errors import KinertiaError
-from kinertia.estimation.result.gait_profile import Control, band_columns, gait_profile, mixture, remarks
 from kinertia.estimation.result.gait_scores import variable_score, with_norms
-from kinertia.estimation.result.mean_cycles import convention_of, mean_curves
+from kinertia.estimation.result.mean_cycles import (
+    Control,
+    band_columns,
+    convention_of,
+    gait_profile,
+    mean_curves,
+    mixture,
+    remarks,
+)
 from kinertia.io.norms_file import Norm
 from kinertia.model.coordinate_pairs import opposite_on_left
 from kinertia.motion.gait_cycle import PERCENT, feet_under_pelvis
@@ -56,7 +63,7 @@ def test_the_overall_score_has_the_pelvis_once_from_the_left(fit, curves, monkey
     both |= {(name, "l"): np.full(101, 3.0) for name in list(CLINICAL_ANGLES)[:3]}
     both |= {(name, "r"): np.full(101, 100.0) for name in list(CLINICAL_ANGLES)[:3]}
     both["knee_flexion_clinical", "r"] = np.full(101, 6.0)
-    monkeypatch.setattr("kinertia.estimation.result.gait_profile.mean_curves", lambda fit: both)
+    monkeypatch.setattr("kinertia.estimation.result.mean_cycles.mean_curves", lambda fit: both)
     zero = {name: Norm(np.array([0.0, 100.0]), np.zeros(2), np.ones(2)) for name in CLINICAL_ANGLES}
     profile = gait_profile(fit, zero)
     assert profile.overall_deg == pytest.approx(np.sqrt((3 * 3.0**2 + 6.0**2) / 15))

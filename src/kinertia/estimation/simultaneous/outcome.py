@@ -9,8 +9,7 @@ import numpy as np
 from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentInformation
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
-from kinertia.estimation.simultaneous.search.linearised import Linearised, Point
-from kinertia.estimation.simultaneous.search.problem import MapProblem
+from kinertia.estimation.simultaneous.search.problem import Linearised, MapProblem, Point
 from kinertia.estimation.simultaneous.terms.cost_term import Solution
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.uncertainty.evidence import Evidence, InstrumentSupport, MissingLoad

@@ -22,14 +22,13 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.estimation.prior import BspPrior
-from kinertia.estimation.simultaneous.linear_algebra.static_information import StaticInformation
+from kinertia.estimation.simultaneous.linear_algebra.normal_equations import StaticInformation
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.observation import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.outcome import Ended, SimultaneousResult, result_of
 from kinertia.estimation.simultaneous.search.delay_profile import CostProfile, with_left_out
 from kinertia.estimation.simultaneous.search.gauss_newton import AdaptedPrior, GaussNewton, MotionAlone, SecantPairs
-from kinertia.estimation.simultaneous.search.linearised import Linearised, Point, Slope
-from kinertia.estimation.simultaneous.search.problem import MapProblem
+from kinertia.estimation.simultaneous.search.problem import Linearised, MapProblem, Point, Slope
 from kinertia.estimation.simultaneous.terms.all_terms import TERMS
 from kinertia.estimation.simultaneous.terms.calibration_terms import as_displaced
 from kinertia.estimation.simultaneous.terms.cost_term import CostTerm

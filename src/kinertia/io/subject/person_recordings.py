@@ -25,8 +25,7 @@ from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import Recording
 from kinertia.trial.file_contents import Belt
 from kinertia.trial.plate_loading import with_unloaded_levels
-from kinertia.trial.plate_names import selected, with_plates_of_trial
-from kinertia.trial.trial_input import TrialInput
+from kinertia.trial.trial_input import TrialInput, selected, with_plates_of_trial
 
 Progress = Callable[[str, float], None]
 _ONE_CSV, _TWO_CSV = ("speed_m_s",), ("right_m_s", "left_m_s")

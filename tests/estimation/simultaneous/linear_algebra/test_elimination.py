@@ -11,7 +11,7 @@ import kinertia.estimation.simultaneous.linear_algebra.frame_blocks as limits
 import kinertia.estimation.simultaneous.solver as solver
 from kinertia.estimation.simultaneous.linear_algebra.frame_blocks import TimeBlock, halves, joined, time_blocks
 from kinertia.estimation.simultaneous.linear_algebra.motion_basis import MotionBasis
-from kinertia.estimation.simultaneous.linear_algebra.static_information import StaticInformation
+from kinertia.estimation.simultaneous.linear_algebra.normal_equations import StaticInformation
 from kinertia.estimation.simultaneous.search.problem import MapProblem
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations, curve_deviations

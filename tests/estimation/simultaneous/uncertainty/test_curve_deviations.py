@@ -5,12 +5,11 @@ import pytest
 
 from kinertia.estimation.simultaneous import solver
 from kinertia.estimation.simultaneous.inputs import BSP, PLACES, STILL
-from kinertia.estimation.simultaneous.linear_algebra.static_information import StaticInformation
+from kinertia.estimation.simultaneous.linear_algebra.normal_equations import StaticInformation
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.outcome import Ended
 from kinertia.estimation.simultaneous.search.gauss_newton import GaussNewton
-from kinertia.estimation.simultaneous.search.linearised import Point
-from kinertia.estimation.simultaneous.search.problem import MapProblem
+from kinertia.estimation.simultaneous.search.problem import MapProblem, Point
 from kinertia.estimation.simultaneous.solver import _roots_in_trials, _uncertainty
 from kinertia.estimation.simultaneous.terms.instrument_term import CLOCK, PLATES, ZEROS
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import curve_deviations

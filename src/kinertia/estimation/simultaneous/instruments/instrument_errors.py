@@ -31,7 +31,7 @@ from kinertia.estimation.simultaneous.instruments.plates import (
     ZERO_UNKNOWNS,
 )
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentInformation, InstrumentPrior
-from kinertia.trial.plate_names import columns_of_several_trials
+from kinertia.trial.trial_input import columns_of_several_trials
 
 ANOTHER_TRIAL = "another trial"
 OTHER_SIGN = "the estimate with free moments of the other sign"

@@ -13,7 +13,7 @@ from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, FaultMix
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.gait27 import AXIS_TILTS, HIP_OFFSETS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
 from kinertia.settings import Instruments
-from kinertia.trial.plate_names import columns_of_several_trials
+from kinertia.trial.trial_input import columns_of_several_trials
 
 FAULT_PROBABILITY = 0.05
 PLATE_PRIOR: Mapping[str, FaultMixture] = {

@@ -7,6 +7,6 @@ The coefficients c of a trial are coupled to neighbours in time only, and all of
 
 Eliminating dc leaves (C - B' A^-1 B) ds = h - B' A^-1 g (`elimination`): trials of a person add these, and the inverse
 of the sum is the covariance of s. Unknowns on which markers alone depend are eliminated in the same way
-(`static_information`). `normal_equations` accumulates A, B, C, g, h over knot intervals, `frame_blocks` in blocks of
+(`StaticInformation`). `normal_equations` accumulates A, B, C, g, h over knot intervals, `frame_blocks` in blocks of
 time.
 """

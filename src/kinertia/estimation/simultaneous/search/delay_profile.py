@@ -15,7 +15,7 @@ import numpy as np
 
 from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, GaussianPrior
 from kinertia.estimation.simultaneous.search.gauss_newton import GaussNewton
-from kinertia.estimation.simultaneous.search.linearised import Linearised, Point, Slope
+from kinertia.estimation.simultaneous.search.problem import Linearised, Point, Slope
 
 _FIXING = 1e6
 """Information that fixes the delay where the profile is evaluated, relative to what is known of it."""

@@ -20,10 +20,9 @@ from typing import Self
 import numpy as np
 import scipy.linalg
 
-from kinertia.estimation.simultaneous.linear_algebra.static_information import StaticInformation
+from kinertia.estimation.simultaneous.linear_algebra.normal_equations import StaticInformation
 from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, GaussianPrior
-from kinertia.estimation.simultaneous.search.linearised import Linearised, Point
-from kinertia.estimation.simultaneous.search.problem import MapProblem
+from kinertia.estimation.simultaneous.search.problem import Linearised, MapProblem, Point
 from kinertia.estimation.simultaneous.terms.calibration_terms import Displaced
 
 _MOST_PAIRS = 16

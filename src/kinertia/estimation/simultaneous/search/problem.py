@@ -1,4 +1,4 @@
-"""Sums the cost of all terms: normal equations and gradient at a point.
+"""Sums the cost of all terms, its normal equations and gradient at a point, and holds the cost linearised there.
 
 The cost is the sum of its terms (`terms.TERMS`), each of which adds unknowns, its cost and what it reads from the
 solution. All derivatives are analytic. Frames are summed knot interval by knot interval: the normal matrix is banded in
@@ -6,6 +6,7 @@ the motion and bordered by what does not move.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeVar
 
@@ -21,14 +22,87 @@ from kinertia.estimation.simultaneous.linear_algebra.frame_blocks import (
     time_blocks_of_trials,
 )
 from kinertia.estimation.simultaneous.linear_algebra.normal_equations import EquationsPool, Gradient, NormalEquations
+from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.observation import CalibrationPrior, Observation
-from kinertia.estimation.simultaneous.search.linearised import Linearised, Point, Slope
 from kinertia.estimation.simultaneous.terms.all_terms import TERMS
 from kinertia.estimation.simultaneous.terms.cost_term import CostTerm, GroundLoads, InTrial, Solution, in_order
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.workload import side_by_side
 
 T = TypeVar("T", bound=CostTerm)
+
+
+@dataclass(frozen=True)
+class Point:
+    """Values of all unknowns.
+
+    Attributes:
+        coefficients: per trial the spline coefficients of its motion.
+        static: (S,) unknowns that do not move.
+        displaced: per trial (3 m,) displacements of its markers (`displacement`), in prior standard deviations.
+    """
+
+    coefficients: tuple[np.ndarray, ...]
+    static: np.ndarray
+    displaced: tuple[np.ndarray, ...]
+
+    @property
+    def vector(self) -> np.ndarray:
+        """All unknowns in one vector."""
+        return np.concatenate([*(each.ravel() for each in self.coefficients), self.static, *self.displaced])
+
+    def like(self, vector: np.ndarray) -> "Point":
+        """Return the point whose `vector` this is."""
+        ends = np.cumsum([each.size for each in (*self.coefficients, self.static, *self.displaced)])
+        parts = np.split(vector, ends[:-1])
+        motions = zip(parts, self.coefficients, strict=False)
+        count = len(self.coefficients)
+        return Point(tuple(p.reshape(c.shape) for p, c in motions), parts[count], tuple(parts[count + 1 :]))
+
+
+@dataclass(frozen=True)
+class Slope:
+    """Half the sum of squares at a point, and minus its gradient.
+
+    The instruments' priors are not Gaussian: they are included only by `under`.
+
+    Attributes:
+        point: the point.
+        cost: half the sum of squares of everything.
+        rhs: minus its derivatives by all unknowns, as `Point.vector` has them.
+        instruments: slice of the instruments' unknowns in the vector.
+    """
+
+    point: Point
+    cost: float
+    rhs: np.ndarray
+    instruments: slice
+
+    def under(self, prior: GaussianPrior) -> tuple[float, np.ndarray]:
+        """Return cost and right-hand side with this Gaussian for the instruments."""
+        values, rhs = self.point.vector[self.instruments], self.rhs.copy()
+        rhs[self.instruments] += prior.pull - prior.precision @ values
+        return self.cost + prior.cost(values), rhs
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """Normal equations at a point, with the motions eliminated.
+
+    Attributes:
+        slope: cost and gradient there.
+        trials: each trial's equations, for the static unknowns as they are in it.
+        information: (S, S) of all priors but the instruments'.
+    """
+
+    slope: Slope
+    trials: tuple[Eliminated, ...]
+    information: np.ndarray
+
+    @property
+    def point(self) -> Point:
+        """The point of linearisation."""
+        return self.slope.point
 
 
 class MapProblem:

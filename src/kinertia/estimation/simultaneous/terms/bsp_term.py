@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from kinertia.estimation.simultaneous.inputs import BSP, FreedModel, Given, Unknowns
-from kinertia.estimation.simultaneous.linear_algebra.static_information import LEAST_INFORMATION
+from kinertia.estimation.simultaneous.linear_algebra.normal_equations import LEAST_INFORMATION
 from kinertia.estimation.simultaneous.terms.cost_term import CostTerm, Solution
 from kinertia.model.anatomy import segment_of
 from kinertia.model.log_cholesky import nearest_consistent, table_jacobian, to_log_cholesky

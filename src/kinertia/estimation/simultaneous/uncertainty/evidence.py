@@ -22,12 +22,11 @@ import numpy as np
 from scipy.special import ndtri
 
 from kinertia.estimation.simultaneous.calibration_entry import GAIN, INTERVAL_SD, POSITION, CalibrationEntry
-from kinertia.estimation.simultaneous.linear_algebra.static_information import StaticInformation
+from kinertia.estimation.simultaneous.linear_algebra.normal_equations import StaticInformation
 from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, FaultMixture, GaussianPrior, log_chance
 from kinertia.estimation.simultaneous.observation import Observation
 from kinertia.estimation.simultaneous.search.gauss_newton import GaussNewton
-from kinertia.estimation.simultaneous.search.linearised import Point, Slope
-from kinertia.estimation.simultaneous.search.problem import MapProblem
+from kinertia.estimation.simultaneous.search.problem import MapProblem, Point, Slope
 from kinertia.estimation.simultaneous.terms.instrument_term import (
     MISSING,
     MISSING_SD,

@@ -13,8 +13,7 @@ from typing import Self
 import numpy as np
 
 from kinertia.estimation.simultaneous.search.gauss_newton import GaussNewton
-from kinertia.estimation.simultaneous.search.linearised import Point
-from kinertia.estimation.simultaneous.search.problem import MapProblem
+from kinertia.estimation.simultaneous.search.problem import MapProblem, Point
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
 from kinertia.motion.dynamics import Motion, inverse_dynamics
 from kinertia.motion.ground_reactions import GroundReactions

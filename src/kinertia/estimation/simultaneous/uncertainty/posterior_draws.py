@@ -25,8 +25,7 @@ from kinertia.estimation.simultaneous.linear_algebra.elimination import Eliminat
 from kinertia.estimation.simultaneous.linear_algebra.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.linear_algebra.normal_equations import SPLINES_PER_BLOCK
 from kinertia.estimation.simultaneous.search.gauss_newton import GaussNewton
-from kinertia.estimation.simultaneous.search.linearised import Point
-from kinertia.estimation.simultaneous.search.problem import MapProblem
+from kinertia.estimation.simultaneous.search.problem import MapProblem, Point
 from kinertia.estimation.simultaneous.terms.instrument_term import InstrumentErrors
 from kinertia.estimation.simultaneous.uncertainty.knot_phases import OfPhases, followed
 from kinertia.model.bsp import BodySegmentParameters

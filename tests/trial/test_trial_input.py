@@ -2,7 +2,7 @@
 
 import pytest
 
-from kinertia.trial.plate_names import columns_of_several_trials, plate_of_trial
+from kinertia.trial.trial_input import columns_of_several_trials, plate_of_trial
 
 
 @pytest.mark.parametrize("trials", [("walk 1", "walk 2"), ("walk", "walk (1)"), ("walk (1)", "walk (2)")])
