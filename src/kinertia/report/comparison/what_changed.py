@@ -22,7 +22,7 @@ from kinertia.estimation.changes.session_changes import (
 )
 from kinertia.estimation.prepare.prepared import Prepared, Progress
 from kinertia.estimation.result.fit import Fit
-from kinertia.estimation.result.gait_profile import check_convention, expect_all_nine
+from kinertia.estimation.result.mean_cycles import check_convention, expect_all_nine
 from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.findings.finding import Finding, Severity
 from kinertia.io.norms_file import Norm, read_norms

@@ -255,7 +255,7 @@ def test_a_frame_without_dynamics_says_nothing_about_the_body(problem, here):
 
 
 @pytest.mark.parametrize("place", [0, 4, 5, 6], ids=["mass", "Lxx", "Lyy", "Lzz"])
-def test_bends_are_what_gauss_newton_leaves_out(problem, here, place):
+def test_second_derivatives_are_what_gauss_newton_leaves_out(problem, here, place):
     """The cost is a square in masses and second moments: by their logarithms it bends by its slope more.
 
     Second moments without products, else a diagonal of L stands in other elements, too.
@@ -269,8 +269,8 @@ def test_bends_are_what_gauss_newton_leaves_out(problem, here, place):
         return place.like(problem.slope(place).rhs).static
 
     informed = problem.prior_information(static) + problem.normal(0, coefficients, static).static
-    second = problem.second_derivatives(rhs(static))
-    assert (second[rows] >= 0.0).all()
+    added = problem.second_derivatives(rhs(static))
+    assert (added[rows] >= 0.0).all()
     pulled = [row for row in rows if rhs(static)[row] < 0.0]
     assert pulled
     step = 1e-5
@@ -279,6 +279,6 @@ def test_bends_are_what_gauss_newton_leaves_out(problem, here, place):
         change[row] = step
         second = -(rhs(static + change)[row] - rhs(static - change)[row]) / (2.0 * step)
         left_out = second - (informed[row, row] - LEAST_INFORMATION)
-        assert second[row] == pytest.approx(left_out, rel=1e-3)
+        assert added[row] == pytest.approx(left_out, rel=1e-3)
     others = [row for row in rows if rhs(static)[row] > 0.0]
-    np.testing.assert_array_equal(second[others], 0.0)
+    np.testing.assert_array_equal(added[others], 0.0)
