@@ -191,7 +191,7 @@ def norms(
             except KinertiaError as error:
                 out.print(f"left out: {error}", soft_wrap=True)
     columns = band_columns(list(people.values()))
-    write_then_rename(output, _csv(columns))
+    write_then_rename(output, norms_text(columns))
     if mixed := mixture(list(people.values())):
         out.print(f"note: {mixed}", soft_wrap=True)
     spans = {name: columns[name][0] for name in columns if name.endswith(("_min", "_max"))}
@@ -214,7 +214,8 @@ def _spans_text(spans: dict[str, float | None]) -> str:
     return f" ({', '.join(words)})" if words else ""
 
 
-def _csv(columns: dict[str, list[object]]) -> str:
+def norms_text(columns: dict[str, list[object]]) -> str:
+    """Return the text of a file of norms."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)

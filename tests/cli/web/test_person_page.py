@@ -28,8 +28,13 @@ def test_what_is_missing_is_said_in_the_words_of_the_form(tmp_path, written, ins
         for name in ("static.c3d", "walk.c3d"):
             (person.folder / name).write_bytes(b"")
         person.subject.write_text(WHOLE.replace(written, instead))
+        first = app.ask("/people/Anna").text.replace("&#39;", "'")
+        person.note(saved=True)
         page = app.ask("/people/Anna").text.replace("&#39;", "'")
-    (message,) = re.findall(r'<p class="message warning">(.*?)</p>', page, re.DOTALL)
+    (before,) = re.findall(r'<p class="message warning">(.*?)</p>', first, re.DOTALL)
+    assert plain in before
+    assert not plain or "line" not in before, "no line number before anything was saved"
+    (message,) = re.findall(r'<p class="message error"[^>]*>(.*?)</p>', page, re.DOTALL)
     assert plain in message
     assert re.search(r"subject\.toml(, line \d+)?: ", message)
     assert as_the_command_line in message

@@ -130,6 +130,11 @@ class Library:
         check_folder(self.folder / "person")
         self.folder.mkdir(parents=True, exist_ok=True)
 
+    @property
+    def norms(self) -> Path:
+        """Path of the laboratory's norms, which need not exist."""
+        return self.folder / "norms.csv"
+
     @contextmanager
     def opened(self) -> Iterator[None]:
         """Lock the library during the block; jobs that an earlier process did not finish are noted as interrupted.

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
-from kinertia.cli.web.entries import USE, entries, fields, label_of, marker_set_field, trouble
+from kinertia.cli.web.entries import CONDITION, USE, conditions, entries, fields, label_of, marker_set_field, trouble
 from kinertia.cli.web.file_table import file_table
 from kinertia.cli.web.jobs import KINDS, Job, Jobs
 from kinertia.cli.web.library import LIMITS, PersonFolder
@@ -110,7 +110,7 @@ def person_page(
         content = entries(person)
     except KinertiaError as error:
         broken = str(error)
-    rows = file_table(person.files(), dict(content))
+    rows, stated = file_table(person.files(), dict(content)), conditions(dict(content))
     notes = person.notes()
     found = trouble(person) if person.subject.is_file() else notes.get("draft", "")
     return page(
@@ -120,6 +120,9 @@ def person_page(
         person=person,
         rows=rows,
         use=USE,
+        condition=CONDITION,
+        condition_of={row.name: (typed or {}).get(CONDITION + row.name, stated.get(row.name, "")) for row in rows},
+        conditions=list(dict.fromkeys(stated.values())),
         uses={row.name: (typed or {}).get(USE + row.name, row.use) for row in rows},
         fields=fields(dict(content), typed),
         marker_set=marker_set_field(dict(content), typed),

@@ -87,7 +87,12 @@ def to(request: Request, *parts: str, section: str = "") -> RedirectResponse:
 
 
 async def form(request: Request) -> dict[str, str]:
-    """Read the fields of a form by name, the last of each.
+    """Read the fields of a form by name, the last of each."""
+    return dict(await pairs(request))
+
+
+async def pairs(request: Request) -> list[tuple[str, str]]:
+    """Read the fields of a form, name and value.
 
     Raises:
         HTTPException: it is larger than any of our forms.
@@ -97,7 +102,7 @@ async def form(request: Request) -> dict[str, str]:
         body += chunk
         if len(body) > _LARGEST_FORM:
             raise HTTPException(413, "too large for a form")
-    return dict(parse_qsl(body.decode("utf-8", errors="replace"), keep_blank_values=True))
+    return parse_qsl(body.decode("utf-8", errors="replace"), keep_blank_values=True)
 
 
 def result_file(folder: Path, name: str) -> Response:

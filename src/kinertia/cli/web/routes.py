@@ -1,7 +1,7 @@
 """Maps addresses to handlers. Everything is a page, a form or a file; the state is in the library's folders."""
 
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -26,6 +26,7 @@ from kinertia.cli.web.responses import (
     expect,
     form,
     page,
+    pairs,
     result_file,
     time_left,
     to,
@@ -54,6 +55,7 @@ def application(library: Library, jobs: Jobs, stop: Callable[[], None], examples
         Route("/example/{kind}", actions.add_example, methods=["POST"]),
         Route("/compare", actions.compare),
         Route("/compare/page", actions.compared),
+        Route("/norms", actions.norms, methods=["POST"]),
         Route("/measures.csv", actions.measures_sheet),
         Route("/measures.svg", actions.measures_picture),
         Route("/preparing", actions.preparing),
@@ -70,6 +72,8 @@ def application(library: Library, jobs: Jobs, stop: Callable[[], None], examples
         Route("/people/{name}/progress", actions.progress),
         Route("/people/{name}/subject.toml", actions.subject_file),
         Route("/people/{name}/results.zip", actions.zipped),
+        Route("/people/{name}/letter", actions.letter),
+        Route("/people/{name}/conditions", actions.conditions),
         Route("/people/{name}/copy", actions.copy, methods=["POST"]),
         Route("/people/{name}/check/{file:path}", actions.check_file),
         Route("/people/{name}/results/{file:path}", actions.file),
@@ -102,6 +106,7 @@ class _Actions:
             "home.html.j2",
             people=people,
             folder=self._library.folder,
+            norms=self._library.norms.is_file(),
             limits=LIMITS,
             examples=tuple(self._examples),
             size_mb=SIZE_MB,
@@ -276,17 +281,43 @@ class _Actions:
 
     async def compared(self, request: Request) -> Response:
         """Serve what `kinertia compare` writes about them."""
-        from kinertia.report.comparison.side_by_side import MOST_FITS, render_comparison
-        from kinertia.report.exports.saved_fit import load_fit
+        from kinertia.cli.web.result_pages import people_compared
+        from kinertia.report.comparison.side_by_side import MOST_FITS
 
         chosen = self._chosen(request)
         if not 2 <= len(chosen) <= MOST_FITS:
             raise HTTPException(404, "nothing to compare")
+        return _result(await run_in_threadpool(people_compared, chosen, self._library))
 
-        def made() -> str:
-            return render_comparison({person.name: load_fit(person.results) for person in chosen})
+    async def letter(self, request: Request) -> Response:
+        """Serve the letter of a person, to be printed."""
+        from kinertia.cli.web.result_pages import letter
 
-        return HTMLResponse(await run_in_threadpool(made), headers={"content-security-policy": RESULT_POLICY})
+        person = self._person(request)
+        if not person.fitted:
+            raise HTTPException(404, "there are no results yet")
+        return _result(await run_in_threadpool(letter, person, self._library))
+
+    async def conditions(self, request: Request) -> Response:
+        """Serve the comparison of two conditions of a person."""
+        from kinertia.cli.web.result_pages import conditions_compared
+
+        person, asked = self._person(request), request.query_params
+        if not person.fitted:
+            raise HTTPException(404, "there are no results yet")
+        wanted = (asked.get("before", ""), asked.get("after", ""))
+        return _result(await run_in_threadpool(conditions_compared, person, wanted, self._library))
+
+    async def norms(self, request: Request) -> Response:
+        """Make the library's norms from the results of the chosen people."""
+        from kinertia.cli.web.result_pages import make_norms
+
+        names = dict.fromkeys(value for key, value in await pairs(request) if key == "person")
+        chosen = self._fitted(names)
+        if not chosen:
+            raise KinertiaError("choose the controls: people without pathology who have results")
+        await run_in_threadpool(make_norms, chosen, self._library)
+        return to(request, "")
 
     async def measures_sheet(self, request: Request) -> Response:
         """Serve the empty sheet of girths and lengths that `kinertia init --measures` writes, to be saved."""
@@ -317,7 +348,9 @@ class _Actions:
         return kind
 
     def _chosen(self, request: Request) -> list[PersonFolder]:
-        names = dict.fromkeys(request.query_params.getlist("person"))
+        return self._fitted(dict.fromkeys(request.query_params.getlist("person")))
+
+    def _fitted(self, names: Iterable[str]) -> list[PersonFolder]:
         people = [self._library.person(name) for name in names]
         return [person for person in people if person is not None and person.fitted]
 
@@ -327,6 +360,11 @@ class _Actions:
             return to(request, "people", person.name)
         self._jobs.add(person, "check")
         return to(request, "people", person.name, section=_SECTIONS["check"])
+
+
+def _result(text: str) -> HTMLResponse:
+    """Serve a page of results, with its own scripts, in isolation."""
+    return HTMLResponse(text, headers={"content-security-policy": RESULT_POLICY})
 
 
 def _recognised(person: PersonFolder) -> None:
