@@ -1,8 +1,8 @@
 """Fills limits into what the catalogue says of a code: what it detects, and when it is more or less severe.
 
 A text refers to a limit of the check that reports the code by its name there: `{off_plate:%}` is "5 %", `{lever_arm}`
-is "150 mm", `{lever_arm.usual}` is the range of recordings
-without faults, `{lever_arm.least}` and `{lever_arm.most}` are its ends.
+is "150 mm", `{lever_arm.usual}` is the range of recordings without faults, `{lever_arm.least}` and
+`{lever_arm.most}` are its ends.
 """
 
 import re
@@ -18,13 +18,39 @@ from kinertia.diagnostics.registry import MOTION_CHECKS, PERSON_CHECKS, STATIC_C
 from kinertia.diagnostics.result.registry import ESTIMATE_CHECKS, RESULT_CHECKS
 from kinertia.diagnostics.result.session import APART_SD
 from kinertia.diagnostics.runner import Check
+from kinertia.estimation.body_measures import FAR_SD
+from kinertia.estimation.prepare.prepared import LIGHT_KG
 from kinertia.findings.display import exact
 from kinertia.findings.limit import Limit
 from kinertia.findings.rule import Rule
+from kinertia.io.c3d.reader import PERSON_M
+from kinertia.io.lab_plates import MOMENTS_FIT
 from kinertia.io.opensim.reader import EARTHS_GRAVITY_M_S2
+from kinertia.io.recording import FARTHEST_M
+from kinertia.io.subject.body_files import LONGEST_CM, SHORTEST_CM
+from kinertia.io.subject.person_recordings import FASTEST_M_S
+from kinertia.io.text.number_table import LARGEST_STEP_S
 
 ALL_CHECKS: tuple[Check[Any], ...] = (*STATIC_CHECKS, *MOTION_CHECKS, *PERSON_CHECKS, *ESTIMATE_CHECKS, *RESULT_CHECKS)
+CALIBRATED_M = Limit(0.03, "m")
+"""By which calibration moves markers at most; preparation reports more."""
+KNOWN_BODY_SD = Limit(3.0)
+"""SDs from the prior that a stated segment, or a body built from measures, may be away."""
+MODEL_MASS_SHARE = Limit(0.002)
+"""By which a model's mass is scaled without a word."""
 REPORTED_ELSEWHERE: Mapping[str, Mapping[str, Limit]] = {
+    "F122": {"smallest": Limit(PERSON_M[0], "m"), "largest": Limit(PERSON_M[1], "m")},
+    "F153": {"misses": Limit(MOMENTS_FIT)},
+    "F171": {"farthest": Limit(FARTHEST_M, "m")},
+    "F181": {"fastest": Limit(FASTEST_M_S, "m/s")},
+    "F182": {"shortest": Limit(SHORTEST_CM / 100.0, "m"), "longest": Limit(LONGEST_CM / 100.0, "m")},
+    "M173": {"moved": CALIBRATED_M},
+    "O411": {"share": MODEL_MASS_SHARE},
+    "O413": {"light": Limit(LIGHT_KG, "kg")},
+    "S402": {"distance": KNOWN_BODY_SD},
+    "S403": {"distance": Limit(FAR_SD)},
+    "S404": {"distance": KNOWN_BODY_SD},
+    "T106": {"step": Limit(LARGEST_STEP_S, "s")},
     "O104": {"least": Limit(EARTHS_GRAVITY_M_S2[0], "m/s2"), "most": Limit(EARTHS_GRAVITY_M_S2[1], "m/s2")},
     "O311": {"clamped": CLAMPED},
     "O312": {"share": AT_LIMIT, "beyond": BEYOND_RAD},

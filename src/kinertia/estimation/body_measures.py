@@ -66,7 +66,7 @@ _KINDS_OF_PART = {
 """Segments by the letter in the package's keys."""
 _STEP = 1e-4
 _TELLS = ("mass", "com", "ixx", "iyy", "izz")
-_FAR_SD = 4.0
+FAR_SD = 4.0
 _FEW = 3
 
 
@@ -158,7 +158,7 @@ def _implausible(
     found = [
         _unlike(name, Quantity(value, "m"), Quantity(float(np.exp(others[k])), "m"), distance_sd=_in_sd(away[k]))
         for k, (name, (value, _)) in enumerate(stated.items())
-        if abs(away[k]) > _FAR_SD
+        if abs(away[k]) > FAR_SD
     ]
     for girth, width in girths_with_widths():
         one, other = (measures()[place].name for place in (girth, width))
@@ -172,7 +172,7 @@ def _implausible(
 
 
 def _in_sd(distance: float) -> Quantity:
-    return Quantity(float(abs(distance)), "1", limit=_FAR_SD)
+    return Quantity(float(abs(distance)), "1", limit=FAR_SD)
 
 
 def _unlike(measure: str, value: Quantity, expected: Quantity, **by: Quantity) -> Finding:

@@ -24,7 +24,7 @@ CORTEX = ".forces"
 _SUBJECT = ".b3d"
 FORCE_FILES = (".mot", ".sto", ".tsv", CORTEX)
 """Endings of what is read; those of installed packages that extend Kinertia are read by their functions."""
-_FARTHEST_M, _STRONGEST_N = 1000.0, 1e6
+FARTHEST_M, _STRONGEST_N = 1000.0, 1e6
 """Farther and stronger than anything in a laboratory."""
 
 
@@ -163,19 +163,19 @@ def _expect_laboratory(path: Path, recording: Recording) -> None:
     """Raise a FileError for positions or loads that are impossible in a laboratory: one broken number spoils
     everything."""
     markers, plates = recording.markers, recording.plates
-    far = np.argwhere(np.abs(markers.positions) > _FARTHEST_M)
+    far = np.argwhere(np.abs(markers.positions) > FARTHEST_M)
     if far.size:
         frame, marker, axis = far[0]
         position_m, time_s = float(markers.positions[frame, marker, axis]), float(markers.time[frame])
-        wrong = impossible_position(markers.labels[marker], position_m, time_s, _FARTHEST_M)
+        wrong = impossible_position(markers.labels[marker], position_m, time_s, FARTHEST_M)
         raise FileError.of(path, wrong)
     if plates is None:
         return
-    loads = np.concatenate((plates.force, plates.moment / _FARTHEST_M), axis=2)
+    loads = np.concatenate((plates.force, plates.moment / FARTHEST_M), axis=2)
     strong = np.argwhere(~(np.abs(loads) < _STRONGEST_N))
     if strong.size:
         frame, plate, axis = strong[0]
-        what, unit, limit = ("force", "N", _STRONGEST_N) if axis < 3 else ("moment", "N m", _STRONGEST_N * _FARTHEST_M)
+        what, unit, limit = ("force", "N", _STRONGEST_N) if axis < 3 else ("moment", "N m", _STRONGEST_N * FARTHEST_M)
         name, value = "force_n" if axis < 3 else "moment_nm", float(plates.wrench[frame, plate, axis])
         size = {name: Quantity(value, unit, limit=limit)} if np.isfinite(value) else {}
         load = impossible_load(plates.names[plate], what, float(plates.time[frame]), **size)

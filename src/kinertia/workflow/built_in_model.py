@@ -4,6 +4,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from kinertia.diagnostics.labels.swapped_markers import labels_by_model
+from kinertia.diagnostics.limits import CALIBRATED_M
+from kinertia.diagnostics.result.marker_errors import TORSO_RAD
 from kinertia.diagnostics.runner import blocking
 from kinertia.diagnostics.subject.body_data import unobserved_segments
 from kinertia.errors import BlockedError, MarkerSetError, SettingsError, TrialError
@@ -66,11 +68,8 @@ from kinertia.workflow.screening import Screened, with_widths
 
 _STAYS_M = 1e-4
 """SD (m) of markers that have been adapted already."""
-_FAR_M = 0.03
 _ARM_ROTATION_SD_RAD = 1.0
 _ARMS = frozenset(f"{name}_{side}" for side in "rl" for name in ARM_SEGMENTS)
-_TURNED_RAD = 0.25
-"""The skin turns the markers about the torso by 2 to 6 degrees; shoulders without a third axis, in a run, by 38."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +129,7 @@ def calibrate(
     given = _of_forces(given)
     adapted = adapt(skeleton, given)
     torso_rad: float | None = turn_about("torso", skeleton.markers, adapted.skeleton.markers)
-    if torso_rad is not None and torso_rad > _TURNED_RAD:
+    if torso_rad is not None and torso_rad > TORSO_RAD:
         skeleton = with_rotating_arms(skeleton, trials)
         locked = {name: sd for name, sd in coordinate_sd.items() if name in skeleton.locked}
         given = replace(given, poses=first_poses(skeleton, given.trials), coordinate_sd=locked)
@@ -296,8 +295,8 @@ def _with_trunk(model: Gait27, trials: Sequence[RotatedTrial]) -> tuple[Gait27, 
 def _adapted(calibrated: Calibrated) -> Iterator[Finding]:
     """Report M173 and M174: markers far from their positions in the static trial, and markers on the head."""
     for label, distance_m in calibrated.moved_m.items():
-        if distance_m > _FAR_M:
-            yield finding("M173", Where(markers=(label,)), distance_m=Quantity(distance_m, "m", limit=_FAR_M))
+        if distance_m > CALIBRATED_M:
+            yield finding("M173", Where(markers=(label,)), distance_m=Quantity(distance_m, "m", limit=CALIBRATED_M))
     if calibrated.head:
         yield finding("M174", Where(markers=calibrated.head))
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from kinertia.diagnostics.limits import KNOWN_BODY_SD
 from kinertia.errors import PriorError
 from kinertia.estimation.body_measures import with_measures
 from kinertia.estimation.learnt_prior import LearntPrior
@@ -26,8 +27,6 @@ from kinertia.model.stadium_body import measures as all_measures
 from kinertia.settings import Attached, KnownSegment, PriorSettings
 from kinertia.workflow.masses import with_attached
 
-_UNLIKE_SD = 3.0
-"""Distance from the tables, in SDs, beyond which the user is asked to check the value."""
 _PROSTHESIS_MASS_SD, _PROSTHESIS_SPREAD = 0.4, 3.0
 """Relative SD of a prosthesis' mass, and the factor on the tables' other SDs."""
 _KEPT_SHARE = 1e-3
@@ -72,12 +71,12 @@ def with_known_body(
         source = segments[segment].source or "no source given"
         found.append(_leans_on(f"{segment} {parameter}, {shown(stated)} +- {sd:.2g} ({source})"))
         distance = abs(value - expected) / float(np.hypot(own, sd))
-        if distance > _UNLIKE_SD:
+        if distance > KNOWN_BODY_SD:
             found.append(
                 finding(
                     "S402",
                     Where(part=f"{segment} {parameter}"),
-                    distance_sd=Quantity(distance, "1", limit=_UNLIKE_SD),
+                    distance_sd=Quantity(distance, "1", limit=KNOWN_BODY_SD),
                     stated=stated,
                     expected=Quantity(float(expected), unit, sd=own),
                 )
@@ -152,7 +151,7 @@ def _with_measures(
         _leans_on(f"{len(measures.values)} of {len(all_measures())} girths and lengths from {measures.name}"),
         *(one.in_file(measures.name) for one in body.findings),
     ]
-    if abs(body.total_kg - body_kg) > _UNLIKE_SD * np.hypot(body.total_sd_kg, body_sd):
+    if abs(body.total_kg - body_kg) > KNOWN_BODY_SD * np.hypot(body.total_sd_kg, body_sd):
         yeadon = Quantity(body.total_kg, "kg", sd=body.total_sd_kg)
         found.append(finding("S404", Where(file=measures.name), yeadon_kg=yeadon, stated_kg=Quantity(body_kg, "kg")))
     return prior, found

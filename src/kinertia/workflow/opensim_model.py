@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from kinertia.diagnostics.limits import MODEL_MASS_SHARE
 from kinertia.diagnostics.model.model_on_person import moved_markers
 from kinertia.estimation.prepare.calibration import AdaptationInputs, adapt, first_poses, lock_undetermined
 from kinertia.estimation.prepare.prepared import TotalMass, complete_subject, estimated_bodies, known
@@ -33,8 +34,6 @@ from kinertia.workflow.person_model import (
     with_stated_ranges,
 )
 from kinertia.workflow.screening import Screened
-
-_MASS_TOLERANCE = 0.002
 
 
 def opensim_model(screened: Screened, trials: Sequence[RotatedTrial], model: OsimModel) -> PersonModel:
@@ -96,9 +95,9 @@ def _assumed(
     """List assumptions made about the model: masses scaled, coordinates locked, bodies fixed."""
     file = Where(file=model.path.name)
     assumed = []
-    if abs(factor - 1.0) >= _MASS_TOLERANCE:
+    if abs(factor - 1.0) >= MODEL_MASS_SHARE:
         model_kg, stated_kg = (Quantity(one.total_mass_kg, "kg") for one in (model.bsp, own))
-        by = Quantity(factor, "1", limit=_MASS_TOLERANCE)
+        by = Quantity(factor, "1", limit=MODEL_MASS_SHARE)
         assumed.append(finding("O411", file, factor=by, model_kg=model_kg, stated_kg=stated_kg))
     values = {c.name: c.default for c in model.coordinates}
     angles = {c.name for c in model.coordinates if c.angle}

@@ -38,7 +38,8 @@ _MOVED_AT_SHOULDER_M = Limit(_MOVED_M + _CLAVICLE_M, "m")
 times 17 degrees."""
 _DRIFTING = Limit(3.0)
 """Multiple of the usual SD from which a marker drifts, as in `marker_noise`."""
-_TORSO_RAD = Limit(0.25, "rad")
+TORSO_RAD = Limit(0.25, "rad", usual=(np.radians(2.0), np.radians(6.0)))
+"""The skin turns the markers about the torso by 2 to 6 degrees; shoulders without a third axis, in a run, by 38."""
 _SIDES = {"r": "right", "l": "left"}
 _ACROSS = "mediolateral"
 _FARTHER_M = Limit(0.008, "m", usual=(-0.007, 0.007))
@@ -92,7 +93,7 @@ def _at_shoulders(skeleton: Skeleton) -> set[str]:
     "M172",
     "M175",
     backwards=Limit(BACKWARDS_RAD, "rad"),
-    torso=_TORSO_RAD,
+    torso=TORSO_RAD,
     knee=reported(JOINT_AXIS_SD_RAD, "rad"),
 )
 def corrected_joints(context: ResultContext) -> Iterator[Finding]:
@@ -103,7 +104,7 @@ def corrected_joints(context: ResultContext) -> Iterator[Finding]:
         rotation = Quantity(rotation_rad, "rad")
         yield finding("M171", Where(part=f"{_SIDES[side]} elbow"), rotation_rad=rotation)
     if (torso_rad := context.ready.torso_rotation_rad) is not None:
-        yield finding("M172", Where(part="torso"), rotation_rad=Quantity(torso_rad, "rad", limit=_TORSO_RAD))
+        yield finding("M172", Where(part="torso"), rotation_rad=Quantity(torso_rad, "rad", limit=TORSO_RAD))
     yield from _knee_axes(context)
 
 

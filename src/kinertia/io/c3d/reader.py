@@ -43,7 +43,7 @@ from kinertia.trial.file_contents import FileOutputs
 _OUTPUT_LISTS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
 _MODELLED = "MODELED_MARKERS"
 _OUTPUT_NAME = re.compile(r"(Angles?|Forces?|Moments?|Powers?|GRF)$")
-_PERSON_M = (0.3, 2.8)
+PERSON_M = (0.3, 2.8)
 """How far a person's markers reach in one frame."""
 
 
@@ -178,13 +178,13 @@ def _length_unit(path: Path, parameters: Any, positions: FloatArray, stated: str
     if unit:
         raise unknown_unit(path, "lengths (POINT:UNITS)", f"'{unit}'")
     size = _size(positions)
-    low, high = _PERSON_M
+    low, high = PERSON_M
     likely = [name for name, metres in METRES_PER_UNIT.items() if low < size * metres < high]
     if len(likely) != 1:
         unit = f"not stated, and markers {size:.3g} units apart fit none"
         extent = {"extent": Quantity(size, "1")} if np.isfinite(size) else {}
         raise unknown_unit(path, "lengths (POINT:UNITS)", unit, known=extent)
-    extent_m = Quantity(size * METRES_PER_UNIT[likely[0]], "m", usual=_PERSON_M)
+    extent_m = Quantity(size * METRES_PER_UNIT[likely[0]], "m", usual=PERSON_M)
     return likely[0], [finding("F122", Where(path.name), extent_m=extent_m, unit=Quantity(likely[0]))]
 
 

@@ -18,7 +18,7 @@ from kinertia.model.stadium_body import Measure, measures
 
 COLUMNS = ("measure", "level", "what", "cm", "sd_cm", "first")
 _NEEDED = ("measure", "cm")
-_LONGEST_CM, _SHORTEST_CM = 250.0, 1.0
+LONGEST_CM, SHORTEST_CM = 250.0, 1.0
 _COLUMNS = ("segment", "parameter", "unit", "estimate", "sd")
 
 
@@ -81,13 +81,13 @@ def read_measures(path: Path) -> BodyMeasures:
 
 
 def _length_m(path: Path, line: int, measure: Measure, value_cm: float) -> float:
-    if _SHORTEST_CM <= value_cm <= _LONGEST_CM:
+    if SHORTEST_CM <= value_cm <= LONGEST_CM:
         return value_cm / 100.0
-    problem = f"{value_cm:g} cm; expected {_SHORTEST_CM:g} to {_LONGEST_CM:g} cm"
+    problem = f"{value_cm:g} cm; expected {SHORTEST_CM:g} to {LONGEST_CM:g} cm"
     if value_cm > 0.0:
-        problem += f" (was it in {'m' if value_cm < _SHORTEST_CM else 'mm'}?)"
+        problem += f" (was it in {'m' if value_cm < SHORTEST_CM else 'mm'}?)"
     raise _wrong_measure(
-        path, line, measure.name, problem, value_m=Quantity(value_cm / 100.0, "m", limit=_LONGEST_CM / 100.0)
+        path, line, measure.name, problem, value_m=Quantity(value_cm / 100.0, "m", limit=LONGEST_CM / 100.0)
     )
 
 

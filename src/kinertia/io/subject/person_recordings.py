@@ -30,7 +30,7 @@ from kinertia.trial.trial_input import TrialInput, selected, with_plates_of_tria
 Progress = Callable[[str, float], None]
 _ONE_CSV, _TWO_CSV = ("speed_m_s",), ("right_m_s", "left_m_s")
 _ONE, _TWO = ("belt_speed",), ("belt_speed_right", "belt_speed_left")
-_FASTEST_M_S = 15.0
+FASTEST_M_S = 15.0
 _HEADING_BYTES = 4096
 _TIME_STAMP = re.compile(rb"^TIME_STAMP\t(\d{4})-(\d{2})-(\d{2})\b", re.MULTILINE)
 
@@ -145,9 +145,9 @@ def read_belt(stated: float | tuple[float, float] | Path | None) -> Belt | None:
     time, speed = _from_table(path) if path.suffix.lower() in (".mot", ".sto") else _from_csv(path)
     if not (np.isfinite(speed).all() and (np.diff(time) > 0).all()):
         raise FileError.found(path, "F181", problem=Quantity("times must increase, with a speed for each"))
-    if speed.min() < 0 or speed.max() > _FASTEST_M_S:
-        range_ = Quantity((float(speed.min()), float(speed.max())), "m/s", limit=_FASTEST_M_S)
-        problem = f"speeds from {speed.min():g} to {speed.max():g} m/s; a treadmill's are 0 to {_FASTEST_M_S:g} m/s"
+    if speed.min() < 0 or speed.max() > FASTEST_M_S:
+        range_ = Quantity((float(speed.min()), float(speed.max())), "m/s", limit=FASTEST_M_S)
+        problem = f"speeds from {speed.min():g} to {speed.max():g} m/s; a treadmill's are 0 to {FASTEST_M_S:g} m/s"
         raise FileError.found(path, "F181", speed_m_s=range_, problem=Quantity(problem))
     return Belt(time, speed)
 

@@ -30,7 +30,7 @@ _FEWEST_ODD, _ODD_SHARE = 5, 0.02
 """Rounding makes irregular steps all the time; a missing or repeated sample makes one."""
 _FEWEST_BEFORE_LAST = 10
 """With fewer samples it is unknown which one is irregular."""
-_LARGEST_STEP_S = 0.1
+LARGEST_STEP_S = 0.1
 """Plates are sampled at 50 Hz and more, also once they were reduced to the rate of slow cameras."""
 _NOTICED = 0.05
 """Share of a step; times with smaller deviations stay unchanged."""
@@ -203,8 +203,8 @@ def _even(path: Path, time: FloatArray) -> tuple[FloatArray, tuple[Finding, ...]
     if not steps.size:
         return time, ()
     usual = float(np.median(steps))
-    if usual > _LARGEST_STEP_S:
-        raise FileError.found(path, "T106", step_s=Quantity(usual, "s", limit=_LARGEST_STEP_S))
+    if usual > LARGEST_STEP_S:
+        raise FileError.found(path, "T106", step_s=Quantity(usual, "s", limit=LARGEST_STEP_S))
     odd = np.flatnonzero((steps <= 0) | (np.abs(steps - usual) > 0.5 * abs(usual)))
     unit = rounding_s(time)
     step, start = np.polyfit(np.arange(len(time)), time, 1)
