@@ -1,4 +1,4 @@
-"""Compare estimates and error bars with synthetic truth."""
+"""Compare estimates and error bars with the truth."""
 
 from pathlib import Path
 from typing import Annotated

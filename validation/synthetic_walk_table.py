@@ -1,4 +1,4 @@
-"""Make the package's synthetic walk from a measured one.
+"""Make the package's synthetic walk from measurements.
 
 Makes the package's synthetic walk, `src/kinertia/synthetic/data/*.csv`, from the measured gait2354 walk.
 
