@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from kinertia.cli.population import norms_text
 from kinertia.cli.web.library import Library, PersonFolder
 from kinertia.errors import KinertiaError
-from kinertia.estimation.result.gait_profile import Control, band_columns
+from kinertia.estimation.result.mean_cycles import Control, band_columns
 from kinertia.io.norms_file import read_norms
 from kinertia.io.results.output_folder import write_then_rename
 from kinertia.report.comparison.side_by_side import render_comparison
