@@ -132,6 +132,19 @@ def test_the_report_shows_a_row_per_curve(fit):
     assert 'id="vicon"' in render(other)
 
 
+def test_a_file_with_curves_of_one_side_only(fit):
+    """As where the other foot is on no plate."""
+    (trial,) = as_vicon_has_it(fit).trials
+    outputs = trial.kinematics.trial.outputs
+    left = replace(outputs, values={name: each for name, each in outputs.values.items() if name.startswith("L")})
+    stated = replace(trial.kinematics, trial=replace(trial.kinematics.trial, outputs=left))
+    page = render(replace(fit, trials=(replace(trial, kinematics=stated),)))
+    row = page[page.index('id="vicon"') :].partition("Hip flexion")[2].partition("</tr>")[0]
+    right, left_cell = row.split('<td class="number">')[1:3]
+    assert right.startswith("–")
+    assert left_cell[0].isdigit()
+
+
 @pytest.mark.measured
 def test_of_a_measured_walk(fit_of):
     """Feet of this file have axes that are 11 degrees from Kinertia's, and all else is within the error bars."""
