@@ -254,7 +254,7 @@ def test_missing_empty_and_binary_files(write, tmp_path):
         read_trc(path)
 
 
-coordinates = st.floats(-100, 100).filter(lambda x: abs(x) > 1e-6)
+coordinates = st.floats(-100, -1e-6) | st.floats(1e-6, 100)
 
 
 @settings(deadline=None, max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
