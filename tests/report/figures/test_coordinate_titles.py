@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia import load_fit
 from kinertia.estimation.result.fit import Fit
 from kinertia.report.figures import style
 from kinertia.report.figures.coordinate_titles import convention_of, panels_of, title_of
 from kinertia.report.figures.cycle_figures import cycle_figures
 from kinertia.report.figures.time_figures import joint_moment_figure
-from kinertia.report.pages.file_outputs import compared_outputs
 
 LEGS = ("hip_flexion", "hip_adduction", "hip_rotation", "knee_angle", "ankle_angle", "subtalar_angle")
 
@@ -146,27 +144,3 @@ def test_no_result_that_is_compared_has_the_colour_of_a_side():
     sides = {colour for _, colour in style.SIDES.values() if colour != style.BLACK}
     assert not sides & set(style.COMPARED)
     assert len(set(style.COMPARED)) == len(style.COMPARED)
-
-
-@pytest.mark.measured
-@pytest.mark.parametrize(
-    ("joint", "title"), [("Hip", "Hip extension"), ("Knee", "Knee extension"), ("Ankle", "Ankle plantarflexion")]
-)
-def test_the_clinical_signs_are_vicons(fit_of, joint, title):
-    """Moments of Plug-in Gait in the file and the report's own panel peak in the same direction in stance."""
-    fit = load_fit(fit_of("pig_b").folder)
-    (theirs,) = [
-        one
-        for one in compared_outputs(fit, fit.trials[0])
-        if (one.joint, one.side, one.kind) == (joint, "l", "MOMENTS")
-    ]
-    (trial,) = fit.trials
-    curves = trial.joint_curves
-    figure = joint_moment_figure(trial, fit.mass_kg, convention_of(fit), len(curves.time))
-    (k,) = [k for k, note in enumerate(figure.layout["annotations"]) if note["text"].startswith(f"<b>{title} +")]
-    axis = f"x{k + 1 if k else ''}"
-    (line,) = [one for one in figure.data if one["xaxis"] == axis and one["name"] == "left, estimate"]
-    drawn = np.interp(trial.time, curves.time, np.asarray(line["y"], dtype=float))
-    both = np.isfinite(drawn) & np.isfinite(theirs.theirs)
-    assert both.sum() > 50
-    assert np.corrcoef(theirs.theirs[both], drawn[both])[0, 1] > 0.8
