@@ -76,4 +76,7 @@ def test_norms_are_made_of_the_chosen_people_and_used_in_their_letter(browser, d
         assert letter.status == 200
         assert "Gait Profile Score" in letter.text
         assert "sandbox" in letter.headers["content-security-policy"]
+        unknown = own.ask("/people/Control/conditions?before=shod&after=barefoot")
+        assert unknown.status == 422
+        assert "shod" in unknown.text
         tab.quiet()

@@ -81,8 +81,9 @@ def limit_sentences(found: Sequence[Change], doubt: str) -> Iterator[str]:
     few = sorted({min(one.strides) for one in found if one.assumed})
     if few:
         least = f"{few[0]}" if len(few) == 1 else f"{few[0]} to {few[-1]}"
+        strides = "one stride" if least == "1" else f"{least} strides"
         yield (
-            f"With {least} strides of a condition their spread is hardly known: at least that of four other people was "
+            f"With {strides} of a condition their spread is hardly known: at least that of four other people was "
             "assumed. Three or more repeats of each condition show it."
         )
 
