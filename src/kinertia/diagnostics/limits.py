@@ -14,6 +14,7 @@ from typing import Any
 from kinertia.diagnostics.labels.swapped_markers import LOST_M
 from kinertia.diagnostics.model.model_on_person import MOVED_M
 from kinertia.diagnostics.model.range_limits import AT_LIMIT, BEYOND_RAD, CLAMPED
+from kinertia.diagnostics.preparation_limits import CALIBRATED_M, KNOWN_BODY_SD, MODEL_MASS_SHARE
 from kinertia.diagnostics.registry import MOTION_CHECKS, PERSON_CHECKS, STATIC_CHECKS
 from kinertia.diagnostics.result.registry import ESTIMATE_CHECKS, RESULT_CHECKS
 from kinertia.diagnostics.result.session import APART_SD
@@ -32,12 +33,6 @@ from kinertia.io.subject.person_recordings import FASTEST_M_S
 from kinertia.io.text.number_table import LARGEST_STEP_S
 
 ALL_CHECKS: tuple[Check[Any], ...] = (*STATIC_CHECKS, *MOTION_CHECKS, *PERSON_CHECKS, *ESTIMATE_CHECKS, *RESULT_CHECKS)
-CALIBRATED_M = Limit(0.03, "m")
-"""By which calibration moves markers at most; preparation reports more."""
-KNOWN_BODY_SD = Limit(3.0)
-"""SDs from the prior that a stated segment, or a body built from measures, may be away."""
-MODEL_MASS_SHARE = Limit(0.002)
-"""By which a model's mass is scaled without a word."""
 REPORTED_ELSEWHERE: Mapping[str, Mapping[str, Limit]] = {
     "F122": {"smallest": Limit(PERSON_M[0], "m"), "largest": Limit(PERSON_M[1], "m")},
     "F153": {"misses": Limit(MOMENTS_FIT)},

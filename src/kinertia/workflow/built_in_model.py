@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from kinertia.diagnostics.labels.swapped_markers import labels_by_model
-from kinertia.diagnostics.limits import CALIBRATED_M
+from kinertia.diagnostics.preparation_limits import CALIBRATED_M
 from kinertia.diagnostics.result.marker_errors import TORSO_RAD
 from kinertia.diagnostics.runner import blocking
 from kinertia.diagnostics.subject.body_data import unobserved_segments

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinertia.diagnostics.limits import KNOWN_BODY_SD
+from kinertia.diagnostics.preparation_limits import KNOWN_BODY_SD
 from kinertia.errors import PriorError
 from kinertia.estimation.body_measures import with_measures
 from kinertia.estimation.learnt_prior import LearntPrior

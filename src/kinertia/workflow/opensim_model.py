@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinertia.diagnostics.limits import MODEL_MASS_SHARE
 from kinertia.diagnostics.model.model_on_person import moved_markers
+from kinertia.diagnostics.preparation_limits import MODEL_MASS_SHARE
 from kinertia.estimation.prepare.calibration import AdaptationInputs, adapt, first_poses, lock_undetermined
 from kinertia.estimation.prepare.prepared import TotalMass, complete_subject, estimated_bodies, known
 from kinertia.estimation.prior import SCALE_SD, BspPrior, literature_prior, population_prior
