@@ -77,7 +77,7 @@ def time_blocks(basis: MotionBasis, most: int) -> tuple[TimeBlock, ...]:
     # the last has more splines than the block that the one before it touches
     starts = list(range(0, size - whole, each)) or [0]
     ends = [*starts[1:], size]
-    frames = np.searchsorted(basis.first, [*starts, size]).tolist()
+    frames = [int(np.searchsorted(basis.first, spline)) for spline in (*starts, size)]
     return tuple(
         TimeBlock(slice(start, end), slice(start, min(end + whole, size)), slice(frames[i], frames[i + 1]))
         for i, (start, end) in enumerate(zip(starts, ends, strict=True))
