@@ -1,4 +1,4 @@
-"""Fills limits into what the catalogue says of a code: what it detects, and when it is more or less severe.
+"""Puts the limits of checks into the catalogue's sentences: what a code detects, and when its severity changes.
 
 A text refers to a limit of the check that reports the code by its name there: `{off_plate:%}` is "5 %", `{lever_arm}`
 is "150 mm", `{lever_arm.usual}` is the range of recordings without faults, `{lever_arm.least}` and
