@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from kinertia.cli.app import main
+from kinertia.cli.commands import main
 
 PROGRAM = [sys.executable, "-m", "kinertia"]
 """The command in a process of its own: what a test that kills it, or talks to it, puts its arguments behind."""

@@ -22,7 +22,7 @@ from kinertia.io import samples
 from kinertia.io.recording import read_recording
 from kinertia.io.subject.provenance import sha256
 from kinertia.motion import workload
-from kinertia.report.figures import journal_figure
+from kinertia.report.figures import plots
 from kinertia.settings import Settings, Subject
 from kinertia.synthetic.laboratory import LabNoise
 from kinertia.trial.data import Recording
@@ -349,7 +349,7 @@ def without(monkeypatch):
                 raise ImportError(wanted)
             return real_import(wanted, *args, **kwargs)
 
-        monkeypatch.setattr(journal_figure, "find_spec", spec)
+        monkeypatch.setattr(plots, "find_spec", spec)
         monkeypatch.setattr(builtins, "__import__", imported)
 
     return remove

@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from c3d_writer import plate_parameters, write_c3d
-from kinertia.cli.app import main
+from kinertia.cli.commands import main
 from kinertia.errors import KinertiaError
 from kinertia.io import marker_set_file
 from kinertia.io.c3d import ezc3d_library

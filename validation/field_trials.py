@@ -21,7 +21,7 @@ from typing import Annotated, Any
 
 import typer
 
-from kinertia.cli.app import main as kinertia
+from kinertia.cli.commands import main as kinertia
 from validation.measured_data import data_folder
 from validation.measured_trials import messages_of, severe, table, unexplained
 from validation.page import write_page

@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from kinertia.cli.app import main as kinertia
+from kinertia.cli.commands import main as kinertia
 from validation.measured_data import data_folder
 from validation.measured_trials import table
 from validation.page import write_page

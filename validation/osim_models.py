@@ -10,7 +10,7 @@ from typing import Any
 
 import pandas as pd
 
-from kinertia.cli.app import main as kinertia
+from kinertia.cli.commands import main as kinertia
 from validation.measured_data import data_folder
 from validation.measured_trials import STAGES, farthest, messages_of, table
 from validation.page import write_page

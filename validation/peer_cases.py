@@ -13,7 +13,7 @@ import numpy as np
 import opensim
 import pandas as pd
 
-from kinertia.cli.app import main as kinertia
+from kinertia.cli.commands import main as kinertia
 from kinertia.io.text.sto import read_sto
 from kinertia.io.text.trc import read_trc
 from validation.measured_data import data_folder

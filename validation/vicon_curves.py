@@ -11,8 +11,7 @@ import pandas as pd
 
 from kinertia.estimation.result.fit import Fit
 from kinertia.motion.joint_moments import leg_joints
-from kinertia.motion.vicon_points import ViconPoints
-from kinertia.report.pages.vicon_differences import moment_differences
+from kinertia.report.pages.vicon_differences import ViconPoints, moment_differences
 from kinertia.report.wording import INTERVAL_SD
 
 _OTHERS = {"vicon_axes": "centre and axes", "as_measured": "all"}

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import typer
 
-from kinertia.cli.app import main as kinertia
+from kinertia.cli.commands import main as kinertia
 from kinertia.estimation.result.fit import Fit
 from kinertia.report.exports.saved_fit import load_fit
 from kinertia.report.pages.file_outputs import OutputComparison, compared_outputs

@@ -12,7 +12,7 @@ from typing import Any
 
 import typer
 
-from kinertia.cli.app import application
+from kinertia.cli.commands import application
 from kinertia.io.subject.tables import InstrumentsFiles, Model, PriorFiles, TrialFiles
 from kinertia.model.marker_set import LANDMARKS, SEGMENTS, WIDTHS
 from kinertia.settings import Attached, Diagnostics, KnownSegment, Settings, Subject, Table

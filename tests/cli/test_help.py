@@ -8,7 +8,7 @@ import typer
 from rich.text import Text
 
 from command_line import run
-from kinertia.cli.app import application
+from kinertia.cli.commands import application
 from kinertia.diagnostics.result.residuals import FORCE, MOMENT, PEAK_FORCE_SHARE
 
 

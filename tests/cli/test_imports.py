@@ -21,7 +21,7 @@ SELDOM_NAMED = {
 def test_the_version_is_told_without_loading_the_commands():
     loaded = loaded_by("--version")
     assert "kinertia.cli.start" in loaded
-    assert not loaded & {*SLOW, "numpy", "scipy", "pandas", "pydantic", "typer", "rich", "kinertia.cli.app"}
+    assert not loaded & {*SLOW, "numpy", "scipy", "pandas", "pydantic", "typer", "rich", "kinertia.cli.commands"}
 
 
 @pytest.mark.slow
@@ -29,7 +29,7 @@ def test_a_fit_of_c3d_files_loads_no_pictures_tables_or_studies(c3d_lab, tmp_pat
     loaded = loaded_by("fit", c3d_lab / "subject.toml", "-o", tmp_path / "out", "--quiet")
     assert (tmp_path / "out" / "report.html").is_file()
     assert loaded >= C3D
-    assert not loaded & {*SLOW, *SYNTHETIC, *OSIM_MODELS, "pandas", "kinertia.cli.check", "kinertia.cli.study"}
+    assert not loaded & {*SLOW, *SYNTHETIC, *OSIM_MODELS, "pandas", "kinertia.cli.check", "kinertia.cli.studies"}
 
 
 @pytest.mark.slow

@@ -22,7 +22,7 @@ import pytest
 def test_interruption_leaves_nothing(tmp_path, person, arguments, stage):
     """As the shell's Ctrl-C does it: a signal in the middle of the work, once this stage is told."""
     signals = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
-    code = f"{signals}\nfrom kinertia.cli.app import main; main()"
+    code = f"{signals}\nfrom kinertia.cli.commands import main; main()"
     files = [str(person / word) if word.endswith(".c3d") else word for word in arguments]
     command = [sys.executable, "-c", code, *files, "-o", str(tmp_path / "deep" / "out")]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
@@ -42,7 +42,7 @@ def test_interruption_leaves_nothing(tmp_path, person, arguments, stage):
 def test_the_request_to_end_leaves_nothing(tmp_path, person, name):
     code = """
         import contextlib, os, signal, sys
-        from kinertia.cli.app import main
+        from kinertia.cli.commands import main
         from kinertia.report.pages import check_page
         name, made = sys.argv.pop(), check_page.complete_folder
         signal.signal(getattr(signal, name), signal.SIG_DFL)  # nohup ignores it

@@ -10,7 +10,7 @@ import pytest
 
 from command_line import run
 from kinertia.cli import demo as demo_module
-from kinertia.cli import instruments as instruments_module
+from kinertia.cli import learning
 from kinertia.io.subject.learnt_files import read_session
 from reference import commands
 
@@ -90,7 +90,7 @@ def test_fit_has_the_rows_of_its_table(demo_run, tmp_path, few_evaluations):
 
 
 def test_instruments_says_what_its_file_holds(measured_demo, c3d_lab, tmp_path, monkeypatch):
-    monkeypatch.setattr(instruments_module, "fit_subject", lambda wanted, *_: measured_demo.fit)
+    monkeypatch.setattr(learning, "fit_subject", lambda wanted, *_: measured_demo.fit)
     content = told("instruments", c3d_lab / "subject.toml", "-o", tmp_path / "instruments.toml")
     (person,) = read_session(Path(content["file"]))
     assert content["people"] == [person.name]

@@ -59,9 +59,9 @@ def test_command_prints_and_writes(tables, measured, tmp_path, monkeypatch):
         progress(1.0)
         return tables
 
-    monkeypatch.setattr("kinertia.cli.study.run_variants", given)
-    monkeypatch.setattr("kinertia.cli.study.read_subject", lambda file: file)
-    monkeypatch.setattr("kinertia.cli.study.measured_trial", lambda file, progress: (f"trial of {file}", "its name"))
+    monkeypatch.setattr("kinertia.cli.studies.run_variants", given)
+    monkeypatch.setattr("kinertia.cli.studies.read_subject", lambda file: file)
+    monkeypatch.setattr("kinertia.cli.studies.measured_trial", lambda file, progress: (f"trial of {file}", "its name"))
     options = ["--trial", "a.toml"] if measured else []
     arguments = ["--variants", "--repeats", 2, "--seed", 9, *options, "-o", tmp_path / "out"]
     outcome = run("study", "table1", *arguments)

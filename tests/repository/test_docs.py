@@ -14,7 +14,7 @@ import house
 import reference
 from command_line import run
 from examples import MEASURED, PAGES, ROOT, SYNTHETIC, blocks, difference, link_measured, renewed
-from kinertia.cli.app import application
+from kinertia.cli.commands import application
 from kinertia.estimation.simultaneous.terms.cost_term import CostTerm, LoadTerm
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.samples import NAME, SHA256

@@ -45,7 +45,7 @@ def test_noise_makes_errors_larger():
 
 
 def test_command(tmp_path, monkeypatch):
-    monkeypatch.setattr("kinertia.cli.study.run_sensitivity", lambda *arguments: study_results.sensitivity())
+    monkeypatch.setattr("kinertia.cli.studies.run_sensitivity", lambda *arguments: study_results.sensitivity())
     outcome = run("study", "sensitivity", "-o", tmp_path / "out")
     assert outcome.status == 0, outcome.err
     assert "torso.com_z, thigh.mass" in outcome.out

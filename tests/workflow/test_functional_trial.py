@@ -13,7 +13,7 @@ from kinertia.estimation.result.drawn_fit import kept_draws
 from kinertia.estimation.simultaneous.calibration_entry import AXIS
 from kinertia.io.text.trc import write_trc
 from kinertia.model.gait27 import LEG_AXIS_TILTS
-from kinertia.report.exports.draw_files import write_draws
+from kinertia.report.exports.files import write_draws
 from kinertia.synthetic.laboratory import LabNoise, SkinMotion, camera_noise, record, write_lab
 from kinertia.synthetic.motions import squat
 from kinertia.synthetic.walk import walk, walking_subject

@@ -12,7 +12,7 @@ from kinertia.io.results.output_folder import complete_folder
 from kinertia.io.versions import VERSION
 from kinertia.motion.model_outputs import CONVENTIONS
 from kinertia.report.exports.c3d_results import write_c3d_results
-from kinertia.report.exports.draw_files import write_draws
+from kinertia.report.exports.files import write_draws
 from kinertia.report.exports.saved_fit import read_saved
 from kinertia.report.exports.workbook import write_csv, write_json, write_mat, write_xlsx
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kinertia.cli.terminal import out, plain_table
@@ -14,15 +15,14 @@ from kinertia.estimation.result.leg_moments import coverage_sentence
 from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.overview import Group, Overview, consequences, grouped, in_order, reported
 from kinertia.findings.rule import STAGES, matching, rule
+from kinertia.io.subject.provenance import command_line
+from kinertia.io.subject.tables import Model
 from kinertia.report.exports.files import summary
 from kinertia.report.wording import start_of
 
 if TYPE_CHECKING:
     from rich.table import Table
-from pathlib import Path
 
-from kinertia.io.subject.provenance import command_line
-from kinertia.io.subject.tables import Model
 
 _SHOWN = 3
 _STYLES = {

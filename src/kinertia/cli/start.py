@@ -25,7 +25,7 @@ def main() -> None:
         return
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # otherwise every installed package is searched
     gc.disable()  # what is imported stays: looking through it for garbage, again and again, finds none
-    from kinertia.cli.app import application_for, run
+    from kinertia.cli.commands import application_for, run
 
     app = application_for(given)
     gc.freeze()

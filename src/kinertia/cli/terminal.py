@@ -13,12 +13,15 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, Task, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.text import Text
 
 from kinertia.cli.compiling import compile_once
 from kinertia.errors import BlockedError, FileError, KinertiaError
 
 if TYPE_CHECKING:
-    from rich.console import Capture, Console
+    from rich.console import Capture
     from rich.table import Table
 
 
@@ -109,8 +112,6 @@ def _shown_progress() -> Iterator[Callable[[str, float], None]]:
         yield lambda stage, share: None
         return
     if err.console.is_terminal:
-        from kinertia.cli.progress_bar import shown_bar
-
         with shown_bar(err.console) as move:
             yield move
         return
@@ -133,3 +134,29 @@ def plain_table(*headings: str) -> Table:
     for k, heading in enumerate(headings):
         table.add_column(heading, justify="left" if k == 0 or not heading else "right", overflow="fold")
     return table
+
+
+class _TimeLeftColumn(TimeRemainingColumn):
+    """Column with the time left, labelled as such; empty as long as it is unknown."""
+
+    def render(self, task: Task) -> Text:
+        return super().render(task).append(" left") if task.time_remaining else Text()
+
+
+@contextmanager
+def shown_bar(console: Console) -> Iterator[Callable[[str, float], None]]:
+    """Show a bar for every stage; yields a function that takes the stage's name and its share done."""
+    columns = (TextColumn("{task.description:>20}"), BarColumn(), TimeElapsedColumn(), _TimeLeftColumn())
+    with Progress(*columns, console=console, transient=True) as bar:
+        shown: list[str] = []
+
+        def move(stage: str, share: float) -> None:
+            if shown != [stage]:
+                shown[:] = [stage]
+                for task in bar.task_ids:
+                    bar.remove_task(task)
+                bar.add_task(stage, total=None)  # a task of its own, or the time left would be that of all stages
+            if share > 0:
+                bar.update(bar.task_ids[-1], total=1.0, completed=share)
+
+        yield move

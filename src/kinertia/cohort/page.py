@@ -5,44 +5,37 @@ Made from the cohort's tables: for ten thousand people, curves are summed in pie
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
+from urllib.parse import quote
 
 import numpy as np
+from markupsafe import Markup, escape
 
 from kinertia.cohort.instruments import COLUMNS, drift
 from kinertia.cohort.record import AGAINST
 from kinertia.diagnostics.limits import with_limits
 from kinertia.estimation.result.cycles import UNITS, Kind
+from kinertia.findings.display import outlined, shown
+from kinertia.findings.finding import Severity
+from kinertia.findings.overview import USES
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.rule import matching, rule
 from kinertia.io.results.output_folder import write_then_rename
 from kinertia.model.bsp import PARAMETERS
 from kinertia.motion.gait_cycle import PERCENT
 from kinertia.report.figures import style
 from kinertia.report.figures.bsp_figures import NAMES, segment_name
 from kinertia.report.figures.cycle_figures import band, mean_line
-from kinertia.report.figures.figure import Figure, Panel, dot_figure, small_multiples
+from kinertia.report.figures.figure import Figure, Panel, bar_figure, dot_figure, small_multiples
+from kinertia.report.pages.finding_view import linked
 from kinertia.report.pages.rendering import Part, render_parts
 
 if TYPE_CHECKING:
     import pandas as pd
-from collections import Counter
-from typing import TYPE_CHECKING
-from urllib.parse import quote
 
-from markupsafe import Markup, escape
-
-from kinertia.findings.display import outlined, shown
-from kinertia.findings.finding import Severity
-from kinertia.findings.overview import USES
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.rule import matching, rule
-from kinertia.report.figures.figure import bar_figure
-from kinertia.report.pages.finding_view import linked
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 PAGE = "cohort.html"
 _QUANTILES = {"5 % of people below": 0.05, "median": 0.5, "95 % below": 0.95}

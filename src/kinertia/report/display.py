@@ -12,8 +12,8 @@ from kinertia.io.norms_file import read_norms
 from kinertia.report.exports.datasets import curve_dataset as curve_dataset
 from kinertia.report.exports.datasets import draw_dataset as draw_dataset
 from kinertia.report.exports.files import save_fit as save_fit
-from kinertia.report.figures.journal_figure import save_figure as save_figure
 from kinertia.report.figures.plots import FitFigures, as_plotly
+from kinertia.report.figures.plots import save_figure as save_figure
 from kinertia.report.pages.finding_view import lines
 from kinertia.report.pages.page import bsp_rows, residual_rows
 from kinertia.report.pages.rendering import rendered

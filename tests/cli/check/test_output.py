@@ -93,7 +93,7 @@ def test_page_goes_only_where_it_may(lab):
 def test_nobody_reads_on(lab, mass, status):
     """As with `| head`: the page is there, and the status is the check's."""
     files = [str(lab / name) for name in ("walk.trc", "walk_grf.mot")]
-    command = [sys.executable, "-c", "from kinertia.cli.app import main; main()", "check", *files, "--mass", mass]
+    command = [sys.executable, "-c", "from kinertia.cli.commands import main; main()", "check", *files, "--mass", mass]
     read, write = os.pipe()
     os.close(read)
     try:

@@ -14,7 +14,7 @@ from kinertia.estimation.simultaneous.uncertainty import posterior_draws
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import TrialDraws
 from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.motion.ground_reactions import GroundReactions
-from kinertia.report.exports.draw_files import write_draws
+from kinertia.report.exports.files import write_draws
 from kinertia.report.exports.saved_fit import load_fit, write_fit
 
 SYSTEMATIC = 0.10

@@ -27,7 +27,7 @@ def _python(code, *arguments):
 
 @pytest.mark.slow
 def test_without_ezc3d_a_c3d_file_says_what_to_install(c3d_lab):
-    code = "from kinertia.cli.app import main; main(['check', sys.argv[1]])"
+    code = "from kinertia.cli.commands import main; main(['check', sys.argv[1]])"
     done = _python(code, c3d_lab / "walk.c3d")
     assert done.returncode == 2
     last = done.stderr.splitlines()[-1]

@@ -78,7 +78,7 @@ def test_command_prints_and_writes(table, tmp_path, monkeypatch):
         progress(1.0)
         return replace(table, seed=seed)
 
-    monkeypatch.setattr("kinertia.cli.study.run_table1", given)
+    monkeypatch.setattr("kinertia.cli.studies.run_table1", given)
     outcome = run("study", "table1", "--repeats", 2, "--seed", 9, "-o", tmp_path / "out")
     assert outcome.status == 0, outcome.err
     assert asked == {"repeats": 2, "seed": 9, "frames": len(study_trial().time)}

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from kinertia.cli.population import norms_text
+from kinertia.cli.learning import norms_text
 from kinertia.cli.web.library import Library, PersonFolder
 from kinertia.errors import KinertiaError
 from kinertia.estimation.result.mean_cycles import Control, band_columns

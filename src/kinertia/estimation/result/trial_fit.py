@@ -7,30 +7,27 @@ the other leg does. What is not known is NaN, never zero.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self, TypeAlias
 
 import numpy as np
 
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
+from kinertia.estimation.simultaneous.uncertainty.model_errors import with_drawn_knees
+from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion.dynamics import Motion
+from kinertia.motion.dynamics import Motion, inverse_dynamics
 from kinertia.motion.gait_cycle import Stride, contact_phases, strides_of
 from kinertia.motion.ground_reactions import GroundReactions
+from kinertia.motion.joint_moments import BodyJoint, JointMoments, body_joints, joint_moments
 from kinertia.motion.kinematics import Kinematics
 from kinertia.trial.display import of_report
 from kinertia.trial.trial_input import WITHOUT_STRIDES
 
 if TYPE_CHECKING:
     import pandas as pd
-from dataclasses import replace
-from typing import Self, TypeAlias
 
-from kinertia.estimation.simultaneous.uncertainty.model_errors import with_drawn_knees
-from kinertia.model.bsp import BodySegmentParameters
-from kinertia.motion.dynamics import inverse_dynamics
-from kinertia.motion.joint_moments import BodyJoint, JointMoments, body_joints, joint_moments
 
 Stage: TypeAlias = tuple[Skeleton, BodySegmentParameters, Motion, GroundReactions]
 """What joint loads are computed from: motion at the frames of `Kinematics.course_time`."""

@@ -5,7 +5,9 @@ A killed process cannot clean up, but the system releases its lock: an unlocked 
 
 from __future__ import annotations
 
+import json
 import os
+import platform
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,12 +19,7 @@ from kinertia.errors import FileError
 
 if TYPE_CHECKING:
     from filelock import FileLock
-import json
-import platform
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from filelock import FileLock
 
 _PREFIX, _LOCK = ".kinertia.", "lock"
 BEFORE = "before"

@@ -17,6 +17,7 @@ from kinertia.diagnostics.result.masses import mass_from_force_kg
 from kinertia.diagnostics.result.suitability import suitability
 from kinertia.estimation.identifiability import BaseParameters
 from kinertia.estimation.result.cycles import columns_of, peak_columns, phase_columns, spatiotemporal_columns
+from kinertia.estimation.result.drawn_fit import chosen_draws, drawn_fit
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.leg_moments import forces_before, forces_used, moment_coverage
 from kinertia.estimation.result.trial_fit import JointCurves, TrialFit
@@ -312,3 +313,31 @@ def _each(vectors: Mapping[str, np.ndarray], statistic: Any) -> dict[str, float 
 
 def _max(vectors: np.ndarray) -> float:
     return float(np.linalg.norm(vectors, axis=-1).max())
+
+
+def write_draws(fit: Fit, folder: Path, count: int, seed: int = 0) -> None:
+    """Write `count` posterior draws, each into a sub-folder: `draw_001`, `draw_002` ...
+
+    Each holds `model.osim`, `kinematics.mot`, `ground_reactions.mot` and `external_loads.xml`; with several trials the
+    last three are in a folder per trial, and all share the model. The SD of another program's results over the draws is
+    the posterior SD of its result.
+
+    Args:
+        fit: a fit by the simultaneous method.
+        folder: folder to write to.
+        count: number of draws; a result keeps 200, fewer for long trials.
+        seed: selects draws and their order.
+
+    Raises:
+        KinertiaError: fewer draws are kept.
+    """
+    for place, number in enumerate(chosen_draws(fit, count, seed), start=1):
+        drawn, into = drawn_fit(fit, number), folder / f"draw_{place:03d}"
+        into.mkdir()
+        write_model(drawn, into)
+        for trial in drawn.trials:
+            own = into if len(drawn.trials) == 1 else into / trial.name
+            own.mkdir(exist_ok=True)
+            remark = f"Posterior draw {number + 1} of {fit.subject.name}"
+            write_table(own / "kinematics.mot", coordinates_table(drawn, trial), "kinematics", remark)
+            write_ground_reactions(own, trial.reactions, trial.kinematics.window_s, drawn.skeleton.feet, remark)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,21 +13,15 @@ import pandas as pd
 
 from kinertia.io.results.output_folder import complete_folder
 from kinertia.io.versions import VERSION
-from kinertia.report.figures.journal_figure import has_matplotlib
+from kinertia.report.figures.plots import has_matplotlib
 from kinertia.report.pages.rendering import Part, drawing, render_parts
-from kinertia.studies.table1 import CONDITIONS, PUBLISHED, Table1, table1_json
+from kinertia.studies.table1 import CONDITIONS, PUBLISHED, Errors, Table1, table1_json
+from kinertia.studies.table1_variants import CLASSES, LONG, LONG_GROUND, NOISY, distance, helped, stopped_by
 from kinertia.trial.sampled_data import rms
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
-from kinertia.studies.table1 import Errors
-from kinertia.studies.table1_variants import CLASSES, LONG, LONG_GROUND, NOISY, distance, helped, stopped_by
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 QUANTITIES = {
     "inertia": ("inertia (kg m2)", "inertia_rms_kgm2", "inertia_max_kgm2"),

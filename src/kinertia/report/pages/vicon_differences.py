@@ -4,11 +4,14 @@ Moments are computed again with one thing at a time as Vicon has it: its joint c
 the joint, forces as they were measured (no delay or error of a plate corrected), segments of the tables. What lowers
 the mean square of a difference by more than half is its likely cause. So is filtering, where more than half of the
 mean square is faster than the motion. Nothing is claimed of a difference within the error bars.
+
+Each segment has four: its origin ("LFEO"), and one on each of its axes: anterior ("LFEA"), lateral ("LFEL") and
+proximal ("LFEP").
 """
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -18,13 +21,13 @@ from kinertia.estimation.result.leg_outputs import outputs_of
 from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.estimation.simultaneous.calibration_entry import DELAY, GAIN
 from kinertia.motion.ground_reactions import measured_reactions
-from kinertia.motion.joint_moments import component_signs, joint_wrenches, leg_joints
+from kinertia.motion.joint_moments import BodyJoint, component_signs, joint_wrenches, leg_joints
 from kinertia.motion.smoothing import smooth
-from kinertia.motion.vicon_points import ViconPoints
 from kinertia.report.figures import style
 from kinertia.report.pages.file_outputs import moment_divisor
 from kinertia.report.wording import INTERVAL_SD
 from kinertia.trial.data import FEET
+from kinertia.trial.file_contents import FileOutputs
 from kinertia.trial.sampled_data import nearest_samples, runs
 
 COMPONENTS = ("flexion", "adduction", "rotation")
@@ -38,6 +41,49 @@ _MOST_OF_IT = 0.5
 _CLEAR_SD = 2.0
 _SPLINE = 6
 """Samples that a spline needs."""
+_SEGMENTS = {"Hip": "FE", "Knee": "TI", "Ankle": "FO"}
+"""Vicon's name of the segment below each joint, in whose axes it gives the moment."""
+_CENTRES = {"Hip": "FEP", "Knee": "FEO", "Ankle": "TIO"}
+"""The point that is the joint's centre."""
+_DIRECTIONS = "ALP"
+
+
+@dataclass(frozen=True, eq=False)
+class ViconPoints:
+    """Points of a file at f frames, in ground axes, m; NaN where missing."""
+
+    points: Mapping[str, np.ndarray]
+
+    @classmethod
+    def at(cls, outputs: FileOutputs, time: np.ndarray) -> Self:
+        """Take the points at the frames nearest to these times (f,)."""
+        rows = nearest_samples(outputs.time, time)
+        return cls({name: each[rows] for name, each in outputs.points.items()})
+
+    def centre(self, joint: BodyJoint) -> np.ndarray | None:
+        """Return a joint's centre (f, 3); None if the file lacks it."""
+        return self.points.get(joint.side.upper() + _CENTRES[joint.name])
+
+    def axes(self, joint: BodyJoint, ours: np.ndarray) -> np.ndarray | None:
+        """Return the axes (f, 3, 3) of the segment below a joint in columns, each nearest to ours; None if lacking.
+
+        Args:
+            joint: the joint.
+            ours: (f, 3, 3) Kinertia's axes of the segment in columns.
+        """
+        segment = joint.side.upper() + _SEGMENTS[joint.name]
+        own = [self.points.get(segment + letter) for letter in "O" + _DIRECTIONS]
+        if any(point is None for point in own):
+            return None
+        origin, *ends = (np.asarray(point) for point in own)
+        found = np.stack([end - origin for end in ends], axis=2)
+        found = found / np.linalg.norm(found, axis=1, keepdims=True)
+        alike = np.nanmean(np.einsum("fki,fkj->fij", ours, found), axis=0)
+        nearest = np.abs(alike).argmax(axis=1)
+        if len(set(nearest)) < len(nearest):
+            return None
+        result: np.ndarray = found[:, :, nearest] * np.sign(alike[range(3), nearest])
+        return result
 
 
 @dataclass(frozen=True, eq=False)
