@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import block_diag
 
-from kinertia.estimation.prepare.calibration import marker_jacobian
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.inputs import BSP
 from kinertia.estimation.simultaneous.observation import Observation
 from kinertia.estimation.simultaneous.search.problem import MapProblem
 from kinertia.model.log_cholesky import table_jacobian
+from kinertia.motion.marker_sums import marker_jacobian
 from kinertia.studies.sensitivity import held
 from kinertia.synthetic.laboratory import STUDY_AMPLITUDE_M, STUDY_RATE_RAD_S
 from kinertia.synthetic.walk import SyntheticTrial

@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 
 from generic_static import generic_model, random_coordinates, smooth_motion
-from kinertia.estimation.prepare.calibration import marker_jacobian
 from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.bsp import BodySegmentParameters, transformed_parameters
 from kinertia.model.gait27 import ARM_ROTATIONS, SHOULDER_OFFSETS
 from kinertia.model.kinematic_tree import in_segments
 from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton
 from kinertia.motion.dynamics import Motion, inverse_dynamics, root_regressor
+from kinertia.motion.marker_sums import marker_jacobian
 from kinertia.motion.rigid_body import axis_force_derivatives
 from opensim_model import oracle_of
 from pinocchio_model import axis_forces, pin, pinocchio_model

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from generic_static import generic_model, random_coordinates, smooth_motion
 from kinertia.errors import MarkerSetError, TrialError
-from kinertia.estimation.prepare.calibration import marker_jacobian, sampled
+from kinertia.estimation.prepare.calibration import sampled
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.io.opensim.reader import read_osim
 from kinertia.io.recording import read_recording
@@ -16,7 +16,7 @@ from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.coordinate_range import Range
 from kinertia.model.gait27 import build_gait27
 from kinertia.motion.inverse_kinematics import solve_ik
-from kinertia.motion.marker_sums import variances
+from kinertia.motion.marker_sums import marker_jacobian, variances
 from kinertia.motion.pose_fit import _STEP_TOLERANCE, normal_equations
 from kinertia.trial.data import Markers
 from opensim_model import build_opensim

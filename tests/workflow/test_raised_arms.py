@@ -30,4 +30,4 @@ def test_arms_do_not_take_the_trunk_with_them(swing):
     calibrated = calibrate(model, [trial])
     assert calibrated.torso_rotation_rad > 0.25
     arms = {m.label for m in model.skeleton.markers if str(segment_of(m.segment)).startswith(("upper_arm", "forearm"))}
-    assert max(away for label, away in calibrated.moved_m.items() if label not in arms) < 0.01
+    assert max(away for label, away in calibrated.adaptation.moved_m.items() if label not in arms) < 0.01

@@ -15,6 +15,7 @@ import numpy as np
 
 from kinertia.model.compiled import Float1, Float2, Float3, Int1, compiled, inlined, part
 from kinertia.model.kinematic_tree import KinematicTree, hand_down, inner, place_axes
+from kinertia.model.skeleton import Pose, Skeleton
 
 
 @inlined
@@ -195,3 +196,13 @@ def variances(normal: Float3, added: float) -> np.ndarray:
                 for i in range(m + 1, c):
                     column[i] -= upper[m, i] * column[m]
     return result
+
+
+def marker_jacobian(skeleton: Skeleton, pose: Pose, positions: np.ndarray) -> np.ndarray:
+    """Compute the velocity (n, m, 3, c) of every marker, at positions (n, m, 3) m, for each coordinate at unit rate."""
+    columns = pose.axes.transpose(0, 2, 1)
+    x, y, z = positions[..., None].transpose(2, 0, 1, 3)
+    turn_x, turn_y, turn_z = columns[:, None, 3:].transpose(2, 0, 1, 3)
+    turning = np.stack([turn_y * z - turn_z * y, turn_z * x - turn_x * z, turn_x * y - turn_y * x], axis=2)
+    by_axes = (columns[:, None, :3] + turning) * skeleton.support[skeleton.marker_segments][:, None, :]
+    return skeleton.map.to_coordinates(by_axes, pose.slopes)

@@ -79,7 +79,7 @@ class Calibrated:
     Attributes:
         skeleton: skeleton adapted to the trials.
         findings: labels that contradict the static trial's model.
-        moved_m: per marker label, its distance from its position in the static trial.
+        adaptation: to the trials.
         elbow_rotations_rad: side -> rotation of the elbow axis, where it was rotated.
         torso_rotation_rad: rotation of the torso under its markers that was prevented.
         head: labels of the markers on the head, where they are left out.
@@ -88,7 +88,7 @@ class Calibrated:
 
     skeleton: Skeleton
     findings: list[Finding]
-    moved_m: Mapping[str, float]
+    adaptation: Adaptation
     elbow_rotations_rad: Mapping[str, float]
     torso_rotation_rad: float | None
     head: tuple[str, ...]
@@ -136,7 +136,7 @@ def calibrate(
         adapted = _arms_last(skeleton, given)
     else:
         torso_rad = None
-    return Calibrated(adapted.skeleton, found, adapted.moved_m, elbows, torso_rad, head, free_axes)
+    return Calibrated(adapted.skeleton, found, adapted, elbows, torso_rad, head, free_axes)
 
 
 def _with_axes(skeleton: Skeleton, given: AdaptationInputs) -> Skeleton:
@@ -271,14 +271,15 @@ def _uncertainty(calibrated: Calibrated, landmarks: _Landmarks, shown: bool) -> 
         shown: whether the trials show joint axes. Where they do not, and there is no static trial, the axes of ankles
             stay as adapted: the estimate would tilt them by up to 64 degrees.
     """
-    known_by = GAIT27_UNCERTAINTY
+    known_by = replace(GAIT27_UNCERTAINTY, moved_m=calibrated.adaptation.by_segment_m)
     if landmarks.of_walk:
         centres = {name: WITHOUT_STATIC * sd for name, sd in known_by.centres.items()}
         known_by = replace(known_by, centres=centres, marker_sd_m=WITHOUT_STATIC * MARKER_SD_M)
     if not calibrated.free_axes:
-        return known_by
+        return known_by.with_fixed_axes()
     axes = {name: sd for name, sd in known_by.with_axes().axes.items() if shown or not name.startswith("ankle")}
-    return replace(known_by, axes=axes, before={name: 0.0 for name in LEG_AXIS_TILTS if name in axes})
+    before = {name: 0.0 for name in LEG_AXIS_TILTS if name in axes}
+    return replace(known_by, axes=axes, before=before).with_fixed_axes()
 
 
 def _with_trunk(model: Gait27, trials: Sequence[RotatedTrial]) -> tuple[Gait27, list[RotatedTrial]]:
@@ -294,7 +295,7 @@ def _with_trunk(model: Gait27, trials: Sequence[RotatedTrial]) -> tuple[Gait27, 
 
 def _adapted(calibrated: Calibrated) -> Iterator[Finding]:
     """Report M173 and M174: markers far from their positions in the static trial, and markers on the head."""
-    for label, distance_m in calibrated.moved_m.items():
+    for label, distance_m in calibrated.adaptation.moved_m.items():
         if distance_m > CALIBRATED_M:
             yield finding("M173", Where(markers=(label,)), distance_m=Quantity(distance_m, "m", limit=CALIBRATED_M))
     if calibrated.head:

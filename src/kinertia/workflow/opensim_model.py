@@ -55,9 +55,11 @@ def opensim_model(screened: Screened, trials: Sequence[RotatedTrial], model: Osi
     poses = first_poses(skeleton, measured)
     skeleton, idle = lock_undetermined(skeleton, measured, poses, may_lock)
     moved: list[Finding] = []
+    moved_m: dict[str, float] = {}
     if person.calibrate:
         given = AdaptationInputs(measured, poses, _marker_sd(skeleton), {})
-        skeleton = adapt(with_centre_offsets(model, skeleton), given).skeleton
+        adapted = adapt(with_centre_offsets(model, skeleton), given)
+        skeleton, moved_m = adapted.skeleton, adapted.by_segment_m
         moved = list(moved_markers(model.skeleton, skeleton, [trial.markers for trial in measured]))
     body_kg = TotalMass.of(known(subject.mass_kg), person.attached).body_kg
     own, factor = at_mass(model.bsp, body_kg)
@@ -70,7 +72,7 @@ def opensim_model(screened: Screened, trials: Sequence[RotatedTrial], model: Osi
         skeleton=skeleton,
         prior=population_prior(prior, subject.model_copy(update={"sex": None}), body_kg).prior,
         uncertainty=ModelUncertainty(
-            centres, MARKER_SD_M if person.calibrate else None, held, "the model's own values"
+            centres, MARKER_SD_M if person.calibrate else None, held, "the model's own values", moved_m=moved_m
         ),
         findings=moved,
         assumed=_assumed(model, factor, own, idle, held),

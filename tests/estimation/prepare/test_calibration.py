@@ -62,6 +62,14 @@ def test_moved_markers_come_back(skeleton):
     assert max(error.values()) < 0.012
 
 
+def test_trials_that_repeat_a_misfit_move_markers_no_farther_than_one(skeleton):
+    moved = {"R.Acromium": np.array([0.0, -0.08, 0.02]), "L.Thigh.Front": np.array([0.01, 0.02, -0.01])}
+    markers = [Marker(m.label, m.segment, m.position + moved.get(m.label, 0.0)) for m in skeleton.markers]
+    recording = walk(skeleton.with_markers(markers))
+    once, thrice = (adapt(skeleton, count * [recording], deviations(skeleton), {}) for count in (1, 3))
+    np.testing.assert_allclose(thrice.skeleton.marker_locals, once.skeleton.marker_locals, atol=1e-5)
+
+
 def test_shoulder_offsets_and_arm_rotations_are_found(skeleton):
     values = {"shoulder_x_r": 0.02, "shoulder_y_l": -0.03, "arm_rot_r": 0.6, "pro_sup_l": -0.5}
     truth = skeleton.lock(values)

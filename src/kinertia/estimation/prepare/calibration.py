@@ -5,6 +5,9 @@ acromia by up to 10 cm after a T-pose). Over a few frames of the trials, coordin
 calibration that does not (marker positions, and locked coordinates such as the shoulder centre) are estimated together
 by Gauss-Newton; the static trial is the prior, and a coordinate beyond its range is penalised (`motion_terms`). Frames
 are eliminated one by one (Schur complement), so the cost grows linearly with their number.
+
+What a model cannot follow recurs in every trial: n of them count as much as one, by n times the prior's information.
+Counted as independent, five walks of one person turned the feet under their markers by 7 degrees more than each alone.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -18,8 +21,9 @@ from kinertia.estimation.simultaneous.terms.motion_terms import RangeTerms
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.coordinate_range import Bounds
-from kinertia.model.skeleton import Marker, Pose, Skeleton
+from kinertia.model.skeleton import Marker, Skeleton
 from kinertia.motion.inverse_kinematics import InverseKinematics, solve_ik
+from kinertia.motion.marker_sums import marker_jacobian
 from kinertia.trial.data import Markers, Trial
 from kinertia.trial.sampled_data import span_s
 
@@ -67,6 +71,15 @@ class Adaptation:
     moved_m: Mapping[str, float]
     coordinates: Mapping[str, float]
 
+    @property
+    def by_segment_m(self) -> dict[str, float]:
+        """Per segment, RMS of `moved_m` along each axis."""
+        squares: dict[str, list[float]] = {}
+        for marker in self.skeleton.markers:
+            if marker.label in self.moved_m:
+                squares.setdefault(marker.segment, []).append(self.moved_m[marker.label] ** 2 / 3.0)
+        return {segment: float(np.sqrt(np.mean(each))) for segment, each in squares.items()}
+
 
 def first_poses(skeleton: Skeleton, trials: Sequence[Trial]) -> list[InverseKinematics]:
     """Solve the `sampled` frames of each trial to a millimetre, as needed by `lock_undetermined` and `adapt`."""
@@ -98,6 +111,7 @@ def adapt(skeleton: Skeleton, given: AdaptationInputs) -> Adaptation:
     freed = base.free(still)
     columns = {name: i for i, name in enumerate(freed.coordinates)}
     sd = [*coordinate_sd.values(), *np.repeat([given.marker_sd_m[marker.segment] for marker in kept], 3)]
+    used = sum(bool(part.any()) for part in np.split(seen, np.cumsum([len(ik.q) for ik in given.poses])[:-1]))
     problem = _Problem(
         skeleton=freed,
         measured=measured,
@@ -105,7 +119,7 @@ def adapt(skeleton: Skeleton, given: AdaptationInputs) -> Adaptation:
         moving_at=np.array([columns[name] for name in base.coordinates]),
         still_at=np.array([columns[name] for name in still], dtype=int),
         prior=np.concatenate([[base.locked[name] for name in still], base.marker_locals.ravel()]),
-        information=np.diag(np.square(sd) ** -1.0),
+        information=used * np.diag(np.square(sd) ** -1.0),
     )
     static = problem.solved(moving)
     markers = _relocated(kept, static[len(still) :])
@@ -126,7 +140,7 @@ class _Problem:
         bounds: of the moving coordinates.
         moving_at, still_at: columns of moving and of static coordinates.
         prior: (k,) mean of the static unknowns.
-        information: (k, k) of the prior.
+        information: (k, k) of the prior, times the number of trials.
     """
 
     skeleton: Skeleton
@@ -313,13 +327,3 @@ def turn_about(segment: str, before: Sequence[Marker], after: Sequence[Marker]) 
     shifts = np.array([moved[marker.label] - marker.position for marker in worn])
     by_moments = np.linalg.pinv(np.sum(arms**2) * np.eye(3) - arms.T @ arms)
     return float(np.linalg.norm(by_moments @ np.cross(arms, shifts).sum(axis=0)))
-
-
-def marker_jacobian(skeleton: Skeleton, pose: Pose, positions: np.ndarray) -> np.ndarray:
-    """Compute the velocity (n, m, 3, c) of every marker, at positions (n, m, 3) m, for each coordinate at unit rate."""
-    columns = pose.axes.transpose(0, 2, 1)
-    x, y, z = positions[..., None].transpose(2, 0, 1, 3)
-    turn_x, turn_y, turn_z = columns[:, None, 3:].transpose(2, 0, 1, 3)
-    turning = np.stack([turn_y * z - turn_z * y, turn_z * x - turn_x * z, turn_x * y - turn_y * x], axis=2)
-    by_axes = (columns[:, None, :3] + turning) * skeleton.support[skeleton.marker_segments][:, None, :]
-    return skeleton.map.to_coordinates(by_axes, pose.slopes)

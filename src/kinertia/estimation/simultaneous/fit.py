@@ -24,6 +24,7 @@ from kinertia.estimation.simultaneous.terms.all_terms import TERMS
 from kinertia.estimation.simultaneous.terms.cost_term import CostTerm
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.uncertainty.evidence import FreeMomentSign, MissingLoad
+from kinertia.estimation.simultaneous.uncertainty.model_errors import placement
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import PosteriorDraws
 from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import Unlikeness, unlikeness
 from kinertia.model.bsp import BodySegmentParameters
@@ -167,6 +168,10 @@ def fit_simultaneous(
     spans = [_course(one, k) for one, k in zip(pooled, trials, strict=False)]
     informed = any(o.dynamic.any() for o in pooled) or bool(uncertainty.instruments.session)
     known = result.curve_deviations if informed else [sd.of_motion_alone() for sd in result.curve_deviations]
+    known = [
+        _with_placement(sd, calibrated, motion, one, uncertainty)
+        for sd, motion, one in zip(known, result.motions, pooled, strict=False)
+    ]
     curves = zip(known, pooled, spans, strict=False)
     return SimultaneousFit(
         result=result,
@@ -179,6 +184,21 @@ def fit_simultaneous(
         deviations=tuple(sd.spread_over(o.curve_frames - span.start, _size(span)) for sd, o, span in curves),
         foot_loads=tuple(loads[frames] for loads, frames in zip(result.foot_loads, inside, strict=True)),
     )
+
+
+def _with_placement(
+    deviations: CurveDeviations,
+    skeleton: Skeleton,
+    motion: Motion,
+    observation: Observation,
+    uncertainty: ModelUncertainty,
+) -> CurveDeviations:
+    """Add to the deviations of angles what markers and fixed axes may be off by."""
+    frames = observation.curve_frames
+    misplaced_m = np.array([uncertainty.misplaced_m(marker.segment) for marker in skeleton.markers])
+    seen = np.isfinite(observation.markers[frames]).all(axis=2)
+    more = placement(skeleton, motion.q[frames], seen, misplaced_m, uncertainty.fixed_axes)
+    return replace(deviations, coordinates=np.sqrt(np.square(deviations.coordinates) + more))
 
 
 def _course(observation: Observation, kinematics: Kinematics) -> slice:

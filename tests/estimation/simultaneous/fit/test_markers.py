@@ -8,9 +8,9 @@ import pytest
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.instruments.priors import GAIT27_UNCERTAINTY
 from kinertia.synthetic.laboratory import camera_noise
-from kinertia.synthetic.walk import walking_subject
+from kinertia.synthetic.walk import walk, walking_subject
 from results import codes, of_estimate
-from short_walk_fit import estimated, fitted
+from short_walk_fit import estimated, fitted, seen
 from validation.synthetic_walks import kinematics_of
 
 
@@ -60,3 +60,24 @@ def test_markers_that_stay_do_so_in_every_trial(trial):
     literature = walking_subject().literature
     away = (outcome.bsp.table() - literature.table()) / literature_prior(literature).sd
     assert np.abs(away).max() < 2.0
+
+
+def test_only_angles_are_less_certain_where_markers_were_adapted_far_and_axes_are_fixed():
+    trial = walk(walking_subject(), 0.8, 100.0)
+    kinematics = [seen(trial)]
+    moved = replace(GAIT27_UNCERTAINTY, moved_m={"torso": 0.03}).with_fixed_axes()
+    before, after = (estimated(trial, kinematics, uncertainty=one).deviations[0] for one in (GAIT27_UNCERTAINTY, moved))
+    growth = dict(
+        zip(trial.skeleton.coordinates, np.nanmedian(after.coordinates / before.coordinates, axis=0), strict=True)
+    )
+    assert growth["lumbar_rotation"] > 1.5
+    assert growth["hip_rotation_r"] > 1.1
+    assert growth["pelvis_tx"] == 1.0
+    np.testing.assert_array_equal(after.moments, before.moments)
+    np.testing.assert_array_equal(after.powers, before.powers)
+
+
+def test_markers_are_off_by_what_exceeds_their_prior():
+    moved = replace(GAIT27_UNCERTAINTY, moved_m={"torso": 0.013, "pelvis": 0.004})
+    off_m = [moved.misplaced_m(segment) for segment in ("torso", "pelvis", "foot_r")]
+    np.testing.assert_allclose(off_m, [0.012, 0.0, 0.0])

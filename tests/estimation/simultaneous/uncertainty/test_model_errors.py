@@ -12,11 +12,15 @@ from kinertia.estimation.simultaneous.uncertainty.model_errors import (
     LASTS_S,
     block_growth,
     knee_geometry,
+    placement,
     with_drawn_knees,
 )
+from kinertia.model.gait27 import LEG_AXIS_TILTS
 from kinertia.motion.dynamics import Motion
+from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.motion.joint_moments import body_joints, component_signs, joint_axes, joint_moments, joint_wrenches
 from kinertia.synthetic.walk import walk, walking_subject
+from kinertia.trial.data import Markers
 
 SMALL = 1e-3
 """Of the displacement's standard deviations."""
@@ -167,3 +171,57 @@ def test_also_beside_the_plates_and_in_the_joint_of_the_hip():
 @pytest.mark.parametrize("weight", [0.0, 1.0])
 def test_nobody_lands_who_stands_or_flies(weight):
     assert (block_growth(problem(np.full((200, 2), weight)), 0, np.zeros(0), TIME) == 1.0).all()
+
+
+@pytest.fixture(scope="module")
+def walked():
+    """A walk, its markers and its coordinates."""
+    result = walk(walking_subject(), 0.6, 50.0)
+    return result.skeleton, result.motion.q
+
+
+def followed(skeleton, q, displaced):
+    """Coordinates that inverse kinematics finds with `skeleton` for markers of the body `displaced`."""
+    markers = displaced.marker_positions(displaced.pose(q))
+    solved = solve_ik(skeleton, Markers(0.02 * np.arange(len(q)), skeleton.labels, markers), "walk")
+    return solved.q[:, [solved.coordinates.index(name) for name in skeleton.coordinates]]
+
+
+def test_variance_of_a_misplaced_marker_is_what_inverse_kinematics_makes_of_it(walked):
+    skeleton, q = walked
+    at, sd = (
+        skeleton.labels.index(next(m.label for m in skeleton.markers if m.segment == "shank_r")),
+        np.zeros(len(skeleton.labels)),
+    )
+    sd[at] = 1e-3
+    variance = placement(skeleton, q, np.ones((len(q), len(sd)), bool), sd, {})
+    found = np.zeros_like(q)
+    for axis in range(3):
+        places = skeleton.marker_locals.copy()
+        places[at, axis] -= sd[at]
+        found += np.square(followed(skeleton, q, skeleton.with_positions(places)) - followed(skeleton, q, skeleton))
+    turns = skeleton.rotational
+    assert variance[:, turns].max() > 1e-6
+    np.testing.assert_allclose(np.sqrt(variance[:, turns]), np.sqrt(found[:, turns]), atol=2e-5, rtol=0.02)
+    assert (variance[:, ~turns] == 0.0).all()
+
+
+def test_variance_of_a_tilted_axis_is_what_inverse_kinematics_makes_of_it(walked):
+    skeleton, q = walked
+    name, sd = LEG_AXIS_TILTS[0], 0.01
+    seen = np.ones((len(q), len(skeleton.labels)), bool)
+    variance = placement(skeleton, q, seen, np.zeros(len(skeleton.labels)), {name: sd})
+    tilted = skeleton.lock({name: skeleton.locked[name] + sd})
+    found = np.square(followed(skeleton, q, tilted) - followed(skeleton, q, skeleton))
+    turns = skeleton.rotational
+    assert variance[:, turns].max() > 1e-6
+    np.testing.assert_allclose(np.sqrt(variance[:, turns]), np.sqrt(found[:, turns]), atol=2e-5, rtol=0.05)
+
+
+def test_markers_that_are_not_seen_misplace_nothing(walked):
+    skeleton, q = walked
+    sd = np.full(len(skeleton.labels), 0.01)
+    hidden = np.array([marker.segment == "torso" for marker in skeleton.markers])
+    seen = np.tile(~hidden, (len(q), 1))
+    without = placement(skeleton, q, seen, np.where(hidden, 0.0, sd), {})
+    np.testing.assert_array_equal(placement(skeleton, q, seen, sd, {}), without)

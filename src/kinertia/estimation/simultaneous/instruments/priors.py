@@ -11,7 +11,7 @@ import numpy as np
 from kinertia.estimation.simultaneous.instruments.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS
 from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, FaultMixture
 from kinertia.model.bsp import BodySegmentParameters
-from kinertia.model.gait27 import AXIS_TILTS, HIP_OFFSETS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
+from kinertia.model.gait27 import AXIS_TILTS, HIP_OFFSETS, LEG_AXIS_TILTS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
 from kinertia.settings import Instruments
 from kinertia.trial.trial_input import columns_of_several_trials
 
@@ -235,6 +235,8 @@ JOINT_CENTRE_SD_M = 0.010
 JOINT_AXIS_SD_RAD = float(np.radians(5.0))
 MARKER_SD_M = 0.005
 """The calibrated skeleton has its markers from these trials already; what remains is the error of that calibration."""
+FIXED_AXIS_SD_RAD = float(np.radians(4.0) / np.sqrt(2.0))
+"""Of each of two directions in which an axis of knee or ankle that is no unknown may be tilted: 4 degrees together."""
 WITHOUT_STATIC = 2.0
 """Factor on the uncertainty of joint centres and markers of a model that is made from a walk."""
 
@@ -249,6 +251,9 @@ class ModelUncertainty:
         fixed: parameters of the segments that are not in the prior; None if it has all.
         source: where the prior's mean comes from, for messages.
         axes: static coordinate that tilts a joint's axis -> prior standard deviation, rad.
+        fixed_axes: the same of axes that are no unknowns. Only deviations of angles allow for them.
+        moved_m: segment -> RMS distance, along each axis, by which its markers have been adapted to the trials.
+            Deviations of angles allow for as much.
         instruments: priors of plates and synchronisation.
         before: static coordinate -> its value before the trials changed it; for others the skeleton's.
     """
@@ -258,6 +263,8 @@ class ModelUncertainty:
     fixed: BodySegmentParameters | None
     source: str
     axes: Mapping[str, float] = field(default_factory=dict)
+    fixed_axes: Mapping[str, float] = field(default_factory=dict)
+    moved_m: Mapping[str, float] = field(default_factory=dict)
     instruments: InstrumentPrior = field(default_factory=InstrumentPrior)
     before: Mapping[str, float] = field(default_factory=dict)
 
@@ -266,9 +273,19 @@ class ModelUncertainty:
         """All static coordinates that may change -> prior standard deviation, m or rad."""
         return {**self.centres, **self.axes}
 
+    def misplaced_m(self, segment: str) -> float:
+        """Return by how much, along each axis, markers of a segment may be off beyond their prior."""
+        known = 0.0 if self.marker_sd_m is None else self.marker_sd_m
+        return float(np.sqrt(max(self.moved_m.get(segment, 0.0) ** 2 - known**2, 0.0)))
+
     def with_axes(self) -> Self:
         """Return the uncertainty with the axes of knees, ankles and elbows of the 27-DOF model free."""
         return replace(self, axes=dict.fromkeys(AXIS_TILTS, JOINT_AXIS_SD_RAD))
+
+    def with_fixed_axes(self) -> Self:
+        """Return the uncertainty with errors of the axes of knees and ankles of the 27-DOF model that are not free."""
+        fixed = {name: FIXED_AXIS_SD_RAD for name in LEG_AXIS_TILTS if name not in self.axes}
+        return replace(self, fixed_axes=fixed)
 
     @property
     def fixed_kg(self) -> float:

@@ -1,4 +1,7 @@
-"""Adds uncertainty that no unknown has: the geometry of the knee, and skin that moves as a block.
+"""Adds uncertainty that no unknown has: placement of markers and axes, the knee's geometry, skin that moves as a block.
+
+Markers that are centimetres from where the static trial has them were adapted to the trials, and fixed axes are as the
+static trial has them. Both turn the axes of segments throughout a trial: angles are less certain by that.
 
 A knee that is a hinge in the model transmits adduction and rotation moments by constraint. They depend on where its
 centre is and where its axis points, which no equation of motion of the estimate can show: a centre that is displaced
@@ -13,10 +16,11 @@ Measured over the bone of a walking person (Cereatti et al. 2017, J Biomech, doi
 thigh's skin moves fore and aft by some 6 mm in the first 12 % of the stride, with twice the acceleration that it has
 elsewhere. Markers that move together look like a thigh that swings: it leaves no residuals, from which the motion's
 errors are derived (`motion_noise`). The error bars of hip flexion moments are longer there, by the effect of that
-person's skin. Draws of the posterior are not wider.
+person's skin. Draws of the posterior are not wider,
+and have axes as in the estimate.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,17 +28,45 @@ import numpy as np
 from kinertia.estimation.simultaneous.search.problem import MapProblem
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.joint_moments import BodyJoint, JointMoments, component_signs
+from kinertia.motion.marker_sums import marker_jacobian
 
 CENTRE_SD_M = 0.005
 """Standard deviation of the knee's centre to the side, chosen here."""
 AXIS_SD_RAD = float(np.radians(4.0))
 """Standard deviation of its axis' direction about the thigh, chosen here."""
+_SHOWN = 1e-3
+"""Singular values relative to the largest below which no marker shows a combination of angles."""
 _NEXT = {"Hip": "Knee", "Knee": "Ankle"}
 GROWTH = 2.0
 """Of what the markers' errors make of the moment of hip flexion. With it 95 % intervals cover after heel strike, where
 skin moves as measured, nearly as often as elsewhere."""
 LASTS_S = 0.14
 """From landing on: 12 % of the stride of an unhurried walk."""
+
+
+def placement(
+    skeleton: Skeleton, q: np.ndarray, seen: np.ndarray, misplaced_m: np.ndarray, tilts: Mapping[str, float]
+) -> np.ndarray:
+    """Return what misplaced markers and tilted axes add to the variances (d, c) of angles, by inverse kinematics.
+
+    Args:
+        skeleton: with these axes locked.
+        q: (d, c) coordinates.
+        seen: (d, m) which markers are.
+        misplaced_m: (m,) SD of each marker's position in its segment, along each axis.
+        tilts: static coordinate that tilts an axis -> its SD, rad.
+    """
+    names = [name for name in tilts if name in skeleton.locked]
+    free, c = skeleton.free(names), q.shape[1]
+    at = np.array([free.coordinates.index(name) for name in (*skeleton.coordinates, *names)])
+    whole = np.empty((len(q), len(at)))
+    whole[:, at] = np.hstack([q, np.tile([skeleton.locked[name] for name in names], (len(q), 1))])
+    pose = free.pose(whole)
+    by = (marker_jacobian(free, pose, free.marker_positions(pose)) * seen[..., None, None])[..., at]
+    moving, still = np.split(by.reshape(len(q), -1, len(at)), [c], axis=2)
+    follow = np.linalg.pinv(moving, rcond=_SHOWN)
+    changes = [follow * np.repeat(misplaced_m, 3), follow @ still * [tilts[name] for name in names]]
+    return np.where(skeleton.rotational, np.square(np.concatenate(changes, axis=2)).sum(axis=2), 0.0)
 
 
 def knee_geometry(skeleton: Skeleton, joints: Sequence[BodyJoint], loads: np.ndarray) -> np.ndarray:
