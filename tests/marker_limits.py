@@ -6,7 +6,7 @@ the severities found of each. Where the quantity is not the limit's own, a funct
 
 import numpy as np
 
-from kinertia.diagnostics.labels.segment_rigidity import rigidity
+from kinertia.diagnostics.labels.swapped_markers import rigidity
 from kinertia.diagnostics.markers.axes_and_floor import unit_and_vertical
 from kinertia.diagnostics.markers.frames import frames
 from kinertia.diagnostics.markers.trajectories import precision, trajectories, visible

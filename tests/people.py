@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.person_context import PersonContext
+from kinertia.diagnostics.context import PersonContext, RecordingContext
 from kinertia.estimation.prepare.prepared import TotalMass
 from kinertia.findings.finding import Finding
 from kinertia.model.bsp import BodySegmentParameters

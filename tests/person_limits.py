@@ -10,11 +10,11 @@ from kinertia.diagnostics.markers import axes_and_floor
 from kinertia.diagnostics.plates.ground_contact import foreign_load
 from kinertia.diagnostics.subject import body_data, movements
 from kinertia.diagnostics.subject.body_data import stated_and_filed
-from kinertia.diagnostics.subject.camera_scale import trial_scales
 from kinertia.diagnostics.subject.mass import masses_of_trials, stated_mass
+from kinertia.diagnostics.subject.movements import flat_feet
 from kinertia.diagnostics.subject.same_person import static_and_trials, trials_of_one_person
-from kinertia.diagnostics.subject.standing import flat_feet
-from kinertia.diagnostics.timing import belt_speed, contact_delays
+from kinertia.diagnostics.subject.same_session import trial_scales
+from kinertia.diagnostics.timing import contact_delays, force_timing
 from kinertia.diagnostics.timing.force_timing import TrialDelay, force_rate, uneven_delays
 from kinertia.estimation.prepare.prepared import TotalMass
 from kinertia.findings.where import Where
@@ -133,11 +133,11 @@ def uneven(seconds, short=False):
 
 
 def belt(feet_m_s, patched, stated_m_s=2.0):
-    patched.setattr(belt_speed, "standing_speeds", lambda markers, feet: (feet_m_s, feet_m_s))
+    patched.setattr(force_timing, "standing_speeds", lambda markers, feet: (feet_m_s, feet_m_s))
     own = SimpleNamespace(distance_m=lambda start, end: stated_m_s * (end - start))
     stated = SimpleNamespace(under=lambda foot: own, speed_m_s=np.array([stated_m_s]))
     markers, recording = SimpleNamespace(time=FEW / 100), SimpleNamespace(belt=stated)
-    return belt_speed.belt_speed(SimpleNamespace(recording=recording, all_markers=markers, feet=object(), at=at))
+    return force_timing.belt_speed(SimpleNamespace(recording=recording, all_markers=markers, feet=object(), at=at))
 
 
 def filed(**values):

@@ -4,12 +4,11 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from kinertia.diagnostics.evidence.shared_and_stray_loads import stray_contacts
-from kinertia.diagnostics.plates import cop_path, free_moments, plate_height
+from kinertia.diagnostics.evidence.ambiguous_loads import stray_contacts
+from kinertia.diagnostics.plates import cop_positions, free_moments, plate_positions
 from kinertia.diagnostics.plates import signals as plate_signals
-from kinertia.diagnostics.plates.axes_and_units import axes_and_units
-from kinertia.diagnostics.plates.cop_path import cop_on_plate
-from kinertia.diagnostics.plates.cop_positions import loads_and_feet
+from kinertia.diagnostics.plates.cop_positions import cop_on_plate, loads_and_feet
+from kinertia.diagnostics.plates.force_directions import axes_and_units
 from kinertia.diagnostics.plates.gains import gains
 from kinertia.diagnostics.plates.ground_contact import stray_loads
 from kinertia.diagnostics.plates.plate_positions import repeated_plates
@@ -168,8 +167,8 @@ def weighing(ratio):
 
 
 def raised(height_m, patched):
-    patched.setattr(plate_height, "heights_on_plates", lambda trial: {"plate": (height_m, 0.0)})
-    return plate_height.plate_heights(SimpleNamespace(trials=[SimpleNamespace(at=at)]))
+    patched.setattr(plate_positions, "heights_on_plates", lambda trial: {"plate": (height_m, 0.0)})
+    return plate_positions.plate_heights(SimpleNamespace(trials=[SimpleNamespace(at=at)]))
 
 
 def progressing(patched, one=0.3, other=0.3, range_m=0.1):
@@ -178,11 +177,11 @@ def progressing(patched, one=0.3, other=0.3, range_m=0.1):
         SimpleNamespace(plate=p, foot=p, is_step=True, place=np.array([[0.0, 0.0], [size, 0.0]]), share=share)
         for p, (share, size) in enumerate(((one, range_m), (other, 0.1)))
     ]
-    patched.setattr(cop_path, "heel_steps", lambda context: steps)
-    patched.setattr(cop_path, "_progression_m", lambda step, foot: 0.2 * step.share)
+    patched.setattr(cop_positions, "heel_steps", lambda context: steps)
+    patched.setattr(cop_positions, "_progression_m", lambda step, foot: 0.2 * step.share)
     feet = (SimpleNamespace(length_m=0.2), SimpleNamespace(length_m=0.2))
     named = SimpleNamespace(names=("one", "other"))
-    return cop_path.cop_progression(SimpleNamespace(plates=named, foot_trajectories=feet, is_static=False, at=at))
+    return cop_positions.cop_progression(SimpleNamespace(plates=named, foot_trajectories=feet, is_static=False, at=at))
 
 
 def columns(lever_arm_m):

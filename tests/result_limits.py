@@ -6,14 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 
 import upright_model as upright
-from kinertia.diagnostics.model import joint_frames, length_unit, model_on_person
+from kinertia.diagnostics.model import geometry, model_on_person
 from kinertia.diagnostics.model.mass_properties import inertia_size, mass_unit, missing_inertia, model_mass, sides
 from kinertia.diagnostics.model.model_on_person import model_and_trials
-from kinertia.diagnostics.result import masses, plate_errors, residuals, soundness
-from kinertia.diagnostics.result.corrections import delays, zero_offsets
+from kinertia.diagnostics.result import plate_errors, residuals, soundness
+from kinertia.diagnostics.result.corrections import delays, session_contradictions, zero_offsets
 from kinertia.diagnostics.result.marker_errors import moved_markers
 from kinertia.diagnostics.result.residuals import residuals_of
-from kinertia.diagnostics.result.session import session_contradictions
 from kinertia.estimation.prepare.prepared import TotalMass
 from kinertia.estimation.simultaneous.calibration_entry import DELAY, FREE_MOMENT, GAIN, POSITION, ROTATION, ZERO
 from kinertia.estimation.simultaneous.instruments.priors import (
@@ -37,22 +36,22 @@ from results import context, error, walking
 def estimated_mass(total_kg):
     ready = SimpleNamespace(total_mass=TotalMass(70.0, 70.0, 1.0))
     fit = SimpleNamespace(estimate=SimpleNamespace(total_mass_kg=total_kg))
-    return masses.total_mass(SimpleNamespace(fit=fit, ready=ready))
+    return soundness.total_mass(SimpleNamespace(fit=fit, ready=ready))
 
 
 def mass_of_the_motion(mass_kg, patched):
-    patched.setattr(masses, "mass_from_force_kg", lambda literature, trial: mass_kg)
+    patched.setattr(soundness, "mass_from_force_kg", lambda literature, trial: mass_kg)
     fit = SimpleNamespace(trials=[SimpleNamespace(name="walk")])
     by_markers = {"walk": SimpleNamespace(mass_kg=70.0, sd_kg=0.5)}
     ready = SimpleNamespace(literature=None)
-    return masses.forces_of_the_motion(SimpleNamespace(fit=fit, ready=ready, force_masses=by_markers))
+    return soundness.forces_of_the_motion(SimpleNamespace(fit=fit, ready=ready, force_masses=by_markers))
 
 
 def item(mass_in_sds):
     estimate = SimpleNamespace(segments=("bag",), mass_kg=np.array([mass_in_sds]))
     fit = SimpleNamespace(estimate=estimate, posterior=SimpleNamespace(sd=np.array([[1.0]])))
     ready = SimpleNamespace(attached=[SimpleNamespace(name="bag", mass_kg=None)])
-    return masses.attached_items(SimpleNamespace(fit=fit, ready=ready))
+    return soundness.attached_items(SimpleNamespace(fit=fit, ready=ready))
 
 
 def residual(size, column, peak=False, external_n=1e6, mass_kg=0.0):
@@ -234,17 +233,17 @@ def calibrated(distance_m):
 
 
 def long(length_m, patched, extent_m=1.7):
-    patched.setattr(length_unit, "_lengths", lambda skeleton, bsp: [(length_m, "a thigh")])
-    patched.setattr(length_unit, "_extent_m", lambda skeleton: extent_m)
-    return length_unit.length_unit(with_model(upright.skeleton(), upright.bsp()))
+    patched.setattr(geometry, "_lengths", lambda skeleton, bsp: [(length_m, "a thigh")])
+    patched.setattr(geometry, "_extent_m", lambda skeleton: extent_m)
+    return geometry.length_unit(with_model(upright.skeleton(), upright.bsp()))
 
 
 def unmirrored(patched, angle_rad=0.0, distance_m=0.0):
     neutral = SimpleNamespace(sideways=2, pairs=(("hip_r", "hip_l"),))
-    patched.setattr(joint_frames, "neutral_joints", lambda skeleton: neutral)
-    patched.setattr(joint_frames, "_axis_angles", lambda *known: [("hip_r", "hip_l", angle_rad)])
-    patched.setattr(joint_frames, "_mismatch_m", lambda *known: distance_m)
-    return joint_frames.mirrored_joints(with_model(upright.skeleton(), upright.bsp()))
+    patched.setattr(geometry, "neutral_joints", lambda skeleton: neutral)
+    patched.setattr(geometry, "_axis_angles", lambda *known: [("hip_r", "hip_l", angle_rad)])
+    patched.setattr(geometry, "_mismatch_m", lambda *known: distance_m)
+    return geometry.mirrored_joints(with_model(upright.skeleton(), upright.bsp()))
 
 
 def model_of_size(ratio, off_m=0.0):

@@ -5,8 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.person_context import PersonContext
+from kinertia.diagnostics.context import PersonContext, RecordingContext
 from kinertia.io.opensim.reader import read_osim
 from kinertia.model.imported_model import markers_of_model
 from kinertia.model.marker_set import MarkerSet

@@ -1,12 +1,26 @@
-"""Holds one recording for its checks, with evidence from markers and loads together, computed once."""
+"""Holds one recording, and one person with all recordings, for their checks; computes evidence once."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 
-from kinertia.diagnostics.evidence.copied_frames import FEWEST_FRAMES, without_copied_frames
+from kinertia.diagnostics.evidence.ambiguous_loads import (
+    LITTLE_BEYOND_M,
+    FootPoints,
+    Overhang,
+    SharedLoad,
+    overhangs,
+    shared_loads,
+    shows_whole_feet,
+    stray_contacts,
+    without_legs,
+    without_loads,
+)
+from kinertia.diagnostics.evidence.body_motion import ForceVelocity, VelocityChanges, force_velocities
+from kinertia.diagnostics.evidence.foot_trajectories import periods, swing_in_turn
 from kinertia.diagnostics.evidence.force_mass import (
     ForceMass,
     ForeignLoad,
@@ -16,29 +30,24 @@ from kinertia.diagnostics.evidence.force_mass import (
     plate_masses,
     standing_mass,
 )
-from kinertia.diagnostics.evidence.horizontal_velocity import ForceVelocity, VelocityChanges, force_velocities
 from kinertia.diagnostics.evidence.landmarks import cosine, halluces
 from kinertia.diagnostics.evidence.marker_precision import MarkerPrecision
 from kinertia.diagnostics.evidence.plate_contacts import PlateContact, contact_span_s, contacts_of
-from kinertia.diagnostics.evidence.plate_edges import LITTLE_BEYOND_M, FootPoints, Overhang, overhangs
-from kinertia.diagnostics.evidence.shared_and_stray_loads import (
-    SharedLoad,
-    shared_loads,
-    shows_whole_feet,
-    stray_contacts,
-    without_legs,
-    without_loads,
-)
-from kinertia.diagnostics.evidence.strides import periods, swing_in_turn
-from kinertia.diagnostics.evidence.trajectory_faults import TrajectoryFaults
+from kinertia.diagnostics.evidence.trajectory_faults import FEWEST_FRAMES, TrajectoryFaults, without_copied_frames
 from kinertia.diagnostics.marker_context import MarkerContext
 from kinertia.errors import KinertiaError
+from kinertia.estimation.prepare.prepared import TotalMass
+from kinertia.findings.finding import Finding, Severity
+from kinertia.model.imported_model import OsimModel
+from kinertia.model.marker_set import MarkerSet
+from kinertia.settings import Subject
 from kinertia.trial.data import FEET, Markers, PlateLoads, Trial
 from kinertia.trial.plate_assignment import build_trial
 from kinertia.trial.sampled_data import within
 
 _STRAIGHT = 0.87
 """Cosine of 30 degrees: in 33 walks and runs the pelvis turns by up to 20 degrees, in turns of children by 68 to 91."""
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -287,3 +296,65 @@ class RecordingContext(MarkerContext):
         names = () if self.plates is None else self.plates.names
         other = self.plates_reached_beyond | {names[one.plate] for one in self.foreign_contacts}
         return {name: kg for name, kg in self.plate_masses.items() if name not in other}
+
+
+@dataclass(frozen=True, eq=False)
+class PersonContext:
+    """One person with all recordings.
+
+    Attributes:
+        subject: as stated, with what files add.
+        trials: recordings of motions.
+        static: the static trial; None with an OpenSim model, or without one.
+        marker_set: which label is which landmark, or the markers of the model.
+        model: the OpenSim model, where there is one.
+        calibrated: whether markers and joints of the model are to be calibrated.
+        total_mass: stated masses of the body and of attached items; None where no mass is known.
+        found: findings of the recordings themselves, where a question depends on them.
+        more_statics: recordings in which the person stands, of which none is the static trial.
+        files_only: whether single files are checked, besides which there may be others.
+    """
+
+    subject: Subject
+    trials: Sequence[RecordingContext]
+    static: RecordingContext | None = None
+    marker_set: MarkerSet | None = None
+    model: OsimModel | None = None
+    calibrated: bool = False
+    total_mass: TotalMass | None = None
+    found: Sequence[Finding] = field(default=())
+    more_statics: Sequence[RecordingContext] = ()
+    files_only: bool = False
+
+    @property
+    def standing(self) -> Sequence[RecordingContext]:
+        """The static trial, or every recording that may be it."""
+        return self.more_statics if self.static is None else (self.static, *self.more_statics)
+
+    @property
+    def has_trials(self) -> bool:
+        """Whether trials were given, blocked ones included, so that the model is not checked on its own."""
+        return bool(self.trials or self.found)
+
+    def has_error(self, trial: str, *codes: str) -> bool:
+        """Return whether an ERROR of one of these codes, questions or families was found in a trial."""
+        return any(
+            one.severity is Severity.ERROR and one.where.trial == trial and one.code.startswith(codes)
+            for one in self.found
+        )
+
+
+def odd_ones(first: T, other: T, witnesses: Iterable[tuple[float, float]]) -> tuple[T, ...]:
+    """Return the one that most other recordings are farther from; both if there are none, or on a tie.
+
+    Args:
+        first, other: the two that disagree.
+        witnesses: distances of every further recording from the first and from the other.
+
+    >>> odd_ones("walk 1", "walk 2", [(0.001, 0.02), (0.002, 0.015)])
+    ('walk 2',)
+    >>> odd_ones("walk 1", "walk 2", [])
+    ('walk 1', 'walk 2')
+    """
+    votes = sum((to_first > to_other) - (to_first < to_other) for to_first, to_other in witnesses)
+    return (first, other) if votes == 0 else (first,) if votes > 0 else (other,)

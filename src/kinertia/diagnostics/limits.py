@@ -12,15 +12,13 @@ from functools import cache
 from typing import Any
 
 from kinertia.diagnostics.labels.swapped_markers import LOST_M
-from kinertia.diagnostics.model.model_on_person import MOVED_M
-from kinertia.diagnostics.model.range_limits import AT_LIMIT, BEYOND_RAD, CLAMPED
-from kinertia.diagnostics.preparation_limits import CALIBRATED_M, KNOWN_BODY_SD, MODEL_MASS_SHARE
+from kinertia.diagnostics.model.model_on_person import AT_LIMIT, BEYOND_RAD, CLAMPED, MOVED_M
 from kinertia.diagnostics.registry import MOTION_CHECKS, PERSON_CHECKS, STATIC_CHECKS
+from kinertia.diagnostics.result.corrections import APART_SD
 from kinertia.diagnostics.result.registry import ESTIMATE_CHECKS, RESULT_CHECKS
-from kinertia.diagnostics.result.session import APART_SD
 from kinertia.diagnostics.runner import Check
 from kinertia.estimation.body_measures import FAR_SD
-from kinertia.estimation.prepare.prepared import LIGHT_KG
+from kinertia.estimation.prepare.prepared import CALIBRATED_M, KNOWN_BODY_SD, LIGHT_KG, MODEL_MASS_SHARE
 from kinertia.findings.display import exact
 from kinertia.findings.limit import Limit
 from kinertia.findings.rule import Rule

@@ -1,20 +1,61 @@
-"""Holds one recording for its checks, and what its markers show by themselves."""
+"""Holds one recording for its checks, with what its markers show by themselves; names axes as the laboratory does."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Self, TypedDict
 
-from kinertia.diagnostics.axes import Axes, AxisNames
-from kinertia.diagnostics.evidence.copied_frames import without_copied_frames
+import numpy as np
+
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory, foot_trajectories
 from kinertia.diagnostics.evidence.landmarks import CLEAR, headings, landmark_positions, most_forwards
+from kinertia.diagnostics.evidence.trajectory_faults import without_copied_frames
 from kinertia.findings.where import Where
+from kinertia.io.lab_plates import ground_rotation
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import FloatArray, Markers, Recording
 from kinertia.trial.ground_contact import FootMarkers
 from kinertia.trial.marker_quality import Travel, travel
 from kinertia.trial.trial_input import Task
+
+_FORE_AFT, _MEDIOLATERAL = "fore-aft", "mediolateral"
+
+
+class AxisNames(TypedDict):
+    """Names of a ground axis, as keyword arguments of `Where`."""
+
+    axis: str
+    file_axis: str
+
+
+@dataclass(frozen=True)
+class Axes:
+    """Names of the ground axes X, Y (up) and Z of a recording.
+
+    Attributes:
+        vertical: the file's axis that is up, "+Z".
+        fore_aft: ground axis along which the person moves or faces, 0 or 2.
+
+    >>> Axes("+Z", 0).named(2)
+    {'axis': 'mediolateral', 'file_axis': '-Y'}
+    """
+
+    vertical: str = "+Y"
+    fore_aft: int = 0
+
+    @classmethod
+    def of(cls, vertical: str, moves: Travel) -> Self:
+        """Name the axes of a recording: fore-aft is X unless the person walks along Z."""
+        along_z = moves.kind == "walks" and abs(np.sin(np.radians(moves.direction_deg))) > np.sqrt(0.5)
+        return cls(vertical, 2 if along_z else 0)
+
+    def named(self, ground_axis: int) -> AxisNames:
+        """Return the anatomical direction of ground axis 0, 1 or 2, and the signed axis of the file that it is."""
+        across = _FORE_AFT if ground_axis == self.fore_aft else _MEDIOLATERAL
+        direction = "vertical" if ground_axis == 1 else across
+        row = ground_rotation(self.vertical)[ground_axis]
+        index = int(np.argmax(np.abs(row)))
+        return {"axis": direction, "file_axis": f"{'-' if row[index] < 0 else ''}{'XYZ'[index]}"}
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,19 +3,15 @@
 Their order follows from what they need (`runner.in_order`). Checks of a result are in `result/registry`.
 """
 
-from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.context import PersonContext, RecordingContext
 from kinertia.diagnostics.labels.anatomy import anatomy, direction_of_travel, heading
-from kinertia.diagnostics.labels.landmarks import landmarks
-from kinertia.diagnostics.labels.marker_set_match import labels_match
-from kinertia.diagnostics.labels.segment_rigidity import rigidity
-from kinertia.diagnostics.labels.swapped_markers import label_swaps
+from kinertia.diagnostics.labels.marker_set import labels_match, landmarks
+from kinertia.diagnostics.labels.swapped_markers import label_swaps, rigidity
 from kinertia.diagnostics.markers.axes_and_floor import floor, floor_slope, unit_and_vertical
 from kinertia.diagnostics.markers.computed_markers import computed_markers
 from kinertia.diagnostics.markers.frames import frames
-from kinertia.diagnostics.markers.over_smoothed import over_smoothed
-from kinertia.diagnostics.markers.trajectories import absent_markers, precision, trajectories, visible
-from kinertia.diagnostics.model.joint_frames import mirrored_joints, subtalar_axis
-from kinertia.diagnostics.model.length_unit import length_unit
+from kinertia.diagnostics.markers.trajectories import absent_markers, over_smoothed, precision, trajectories, visible
+from kinertia.diagnostics.model.geometry import length_unit, mirrored_joints, subtalar_axis
 from kinertia.diagnostics.model.mass_properties import (
     arms_in_torso,
     compared_with_tables,
@@ -30,11 +26,8 @@ from kinertia.diagnostics.model.mass_properties import (
     unlike_tables,
 )
 from kinertia.diagnostics.model.model_on_person import markers_and_feet, model_and_trials, unmatched_markers
-from kinertia.diagnostics.person_context import PersonContext
-from kinertia.diagnostics.plates.axes_and_units import axes_and_units
-from kinertia.diagnostics.plates.cop_path import cop_on_plate, cop_progression
-from kinertia.diagnostics.plates.cop_positions import loads_and_feet
-from kinertia.diagnostics.plates.force_directions import force_directions, vertical_signs
+from kinertia.diagnostics.plates.cop_positions import cop_on_plate, cop_progression, loads_and_feet
+from kinertia.diagnostics.plates.force_directions import axes_and_units, force_directions, vertical_signs
 from kinertia.diagnostics.plates.free_moments import free_moments, vertical_moment
 from kinertia.diagnostics.plates.gains import gains
 from kinertia.diagnostics.plates.ground_contact import (
@@ -42,10 +35,10 @@ from kinertia.diagnostics.plates.ground_contact import (
     complete_contact,
     foreign_load,
     plate_edges,
+    stance_coverage,
     stray_loads,
 )
-from kinertia.diagnostics.plates.plate_height import plate_heights
-from kinertia.diagnostics.plates.plate_positions import repeated_plates
+from kinertia.diagnostics.plates.plate_positions import plate_heights, repeated_plates
 from kinertia.diagnostics.plates.signals import (
     dead_moments,
     low_passed,
@@ -54,19 +47,14 @@ from kinertia.diagnostics.plates.signals import (
     signals,
     spikes,
 )
-from kinertia.diagnostics.plates.stance_coverage import stance_coverage
 from kinertia.diagnostics.plates.zeros import unloaded_levels, zeros, zeros_under_load
 from kinertia.diagnostics.runner import Check
 from kinertia.diagnostics.subject.body_data import population, stated_and_filed, stature
-from kinertia.diagnostics.subject.camera_scale import trial_scales
-from kinertia.diagnostics.subject.interchanged_forces import interchanged_forces
 from kinertia.diagnostics.subject.mass import masses_of_trials, stated_mass
-from kinertia.diagnostics.subject.movements import informative_movements
+from kinertia.diagnostics.subject.movements import flat_feet, informative_movements, no_static, standing
 from kinertia.diagnostics.subject.same_person import repeated_trials, static_and_trials, trials_of_one_person
-from kinertia.diagnostics.subject.standing import flat_feet, no_static, standing
-from kinertia.diagnostics.timing.belt_speed import belt_speed
-from kinertia.diagnostics.timing.file_events import file_events
-from kinertia.diagnostics.timing.force_timing import force_rate, plate_delay, trial_delays
+from kinertia.diagnostics.subject.same_session import interchanged_forces, trial_scales
+from kinertia.diagnostics.timing.force_timing import belt_speed, file_events, force_rate, plate_delay, trial_delays
 
 MARKER_STATIC_CHECKS: tuple[Check[RecordingContext], ...] = (
     visible,

@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from kinertia.diagnostics.labels.swapped_markers import labels_by_model
-from kinertia.diagnostics.preparation_limits import CALIBRATED_M
 from kinertia.diagnostics.result.marker_errors import TORSO_RAD
 from kinertia.diagnostics.runner import blocking
 from kinertia.diagnostics.subject.body_data import unobserved_segments
@@ -26,7 +25,7 @@ from kinertia.estimation.prepare.model_adaptation import (
     with_rotating_arms,
     with_upright_trunk,
 )
-from kinertia.estimation.prepare.prepared import TotalMass, complete_subject, known
+from kinertia.estimation.prepare.prepared import CALIBRATED_M, TotalMass, complete_subject, known
 from kinertia.estimation.prior import literature_prior, population_prior
 from kinertia.estimation.simultaneous.instruments.priors import (
     GAIT27_UNCERTAINTY,

@@ -7,12 +7,10 @@ from functools import partial
 from pathlib import Path
 from typing import Self
 
-from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.labels.marker_set_match import MarkerSetMatch, match_labels
+from kinertia.diagnostics.context import PersonContext, RecordingContext
+from kinertia.diagnostics.labels.marker_set import MarkerSetMatch, match_labels
 from kinertia.diagnostics.model.model_check import ModelCheck, check_model
-from kinertia.diagnostics.person_context import PersonContext
-from kinertia.diagnostics.plates.plate_summary import PlateCheck, check_plates
-from kinertia.diagnostics.plates.stance_coverage import coverage_of
+from kinertia.diagnostics.plates.ground_contact import PlateCheck, check_plates, coverage_of
 from kinertia.diagnostics.registry import MODEL_CHECKS
 from kinertia.diagnostics.runner import asked, explained, overruled, rules_of
 from kinertia.diagnostics.subject.movements import InformativeMovements, task_of

@@ -9,8 +9,8 @@ from typing import Literal, Self
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.copied_frames import without_copied_frames
-from kinertia.diagnostics.model.range_limits import range_findings
+from kinertia.diagnostics.evidence.trajectory_faults import without_copied_frames
+from kinertia.diagnostics.model.model_on_person import range_findings
 from kinertia.diagnostics.subject.movements import task_of
 from kinertia.errors import SettingsError, TrialError
 from kinertia.estimation.prepare.prepared import Progress

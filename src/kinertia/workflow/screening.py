@@ -11,10 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.context import PersonContext, RecordingContext
 from kinertia.diagnostics.evidence.landmarks import feet_to_pelvis_m, landmark_positions
 from kinertia.diagnostics.markers.computed_markers import computed_points
-from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.plates.ground_contact import complete_contact
 from kinertia.diagnostics.registry import MOTION_CHECKS, PERSON_CHECKS, STATIC_CHECKS
 from kinertia.diagnostics.runner import (

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinertia.diagnostics.result.session import session_contradictions
+from kinertia.diagnostics.result.corrections import session_contradictions
 from kinertia.errors import SessionError
 from kinertia.estimation.prepare.prepared import Prepared
 from kinertia.estimation.result.fit import Fit

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from kinertia.diagnostics.markers.over_smoothed import over_smoothed
+from kinertia.diagnostics.markers.trajectories import over_smoothed
 from kinertia.findings.finding import Severity
 from kinertia.trial.data import Markers
 from plate_findings import codes, context_of, found_in

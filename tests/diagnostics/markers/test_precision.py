@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.evidence.copied_frames import without_copied_frames
+from kinertia.diagnostics.evidence.trajectory_faults import without_copied_frames
 from kinertia.diagnostics.markers.frames import frames
 from kinertia.diagnostics.markers.trajectories import precision
 from kinertia.findings.finding import Severity

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import upright_model as upright
-from kinertia.diagnostics.model.length_unit import length_unit
+from kinertia.diagnostics.model.geometry import length_unit
 from kinertia.io.opensim.reader import read_osim
 from kinertia.model.skeleton import Marker, Skeleton
 from people import with_model

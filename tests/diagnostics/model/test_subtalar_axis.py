@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import upright_model as upright
-from kinertia.diagnostics.model.joint_frames import subtalar_axis
+from kinertia.diagnostics.model.geometry import subtalar_axis
 from kinertia.io.opensim.reader import read_osim
 from kinertia.model.skeleton import Skeleton
 from people import with_model

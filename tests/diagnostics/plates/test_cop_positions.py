@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.plates.cop_path import shows_feet_equally
+from kinertia.diagnostics.plates.cop_positions import shows_feet_equally
 from kinertia.findings.finding import Severity
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import Markers

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.horizontal_velocity import force_velocities
+from kinertia.diagnostics.evidence.body_motion import force_velocities
 from kinertia.diagnostics.plates.force_directions import force_directions, vertical_signs
 from kinertia.findings.finding import finding
 from kinertia.findings.where import Where

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.evidence.plate_edges import Overhang
+from kinertia.diagnostics.evidence.ambiguous_loads import Overhang
 from kinertia.diagnostics.plates.gains import gains
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from plate_findings import context_of, with_force

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.horizontal_velocity import force_velocities
+from kinertia.diagnostics.evidence.body_motion import force_velocities
 from kinertia.diagnostics.plates.cop_positions import forces_keep_time
 from kinertia.diagnostics.registry import LOADED_CHECKS, PLACE_CHECKS
 from kinertia.diagnostics.runner import asked

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.plates.plate_height import plate_heights
+from kinertia.diagnostics.plates.plate_positions import plate_heights
 from kinertia.io.ground_forces import read_forces
 from kinertia.io.recording import read_recording
 from kinertia.io.text.sto import read_table, write_table

@@ -8,7 +8,7 @@ import pytest
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.registry import TIMING_PERSON_CHECKS
 from kinertia.diagnostics.runner import asked, explained
-from kinertia.diagnostics.subject.interchanged_forces import interchanged_forces
+from kinertia.diagnostics.subject.same_session import interchanged_forces
 from kinertia.trial.sampled_data import within
 from trials_of_people import PEOPLE, Trials
 

@@ -5,14 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.labels.landmarks import landmarks
+from kinertia.diagnostics.context import PersonContext, RecordingContext
+from kinertia.diagnostics.labels.marker_set import landmarks
 from kinertia.diagnostics.markers.axes_and_floor import floor
-from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.registry import SUBJECT_STATIC_CHECKS
 from kinertia.diagnostics.runner import asked
 from kinertia.diagnostics.subject.body_data import stature
-from kinertia.diagnostics.subject.standing import flat_feet
+from kinertia.diagnostics.subject.movements import flat_feet
 from kinertia.findings.finding import Severity
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.settings import Subject

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.evidence.plate_edges import Overhang
+from kinertia.diagnostics.evidence.ambiguous_loads import Overhang
 from kinertia.diagnostics.timing.contact_delays import fitted_rate_or_delay
 from kinertia.diagnostics.timing.force_timing import force_rate
 from kinertia.trial.sampled_data import within

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.result.masses import mass_from_force_kg
+from kinertia.diagnostics.result.soundness import mass_from_force_kg
 from kinertia.errors import SettingsError, SubjectError, TrialError
 from kinertia.estimation.prepare.prepared import check_trials, complete_subject
 from kinertia.settings import Subject

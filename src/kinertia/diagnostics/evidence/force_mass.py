@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kinertia.diagnostics.evidence.ambiguous_loads import OVERHANG_M, beyond_edges
 from kinertia.diagnostics.evidence.body_centre import body_centre
-from kinertia.diagnostics.evidence.plate_edges import OVERHANG_M, beyond_edges
-from kinertia.diagnostics.evidence.strides import periods
+from kinertia.diagnostics.evidence.foot_trajectories import periods
 from kinertia.findings.limit import Limit
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.motion.smoothing import MIN_SAMPLES, SmoothingError, smooth

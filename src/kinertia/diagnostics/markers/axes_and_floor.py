@@ -9,10 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.context import PersonContext, RecordingContext
 from kinertia.diagnostics.evidence.landmarks import feet_to_pelvis_m
-from kinertia.diagnostics.person_context import PersonContext
-from kinertia.diagnostics.plates.plate_height import heights_on_plates
+from kinertia.diagnostics.plates.plate_positions import heights_on_plates
 from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.limit import Limit

@@ -10,15 +10,16 @@ import numpy as np
 
 from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.copied_frames import (
+from kinertia.diagnostics.evidence.trajectory_faults import (
     COPIED_SHARE,
     FEWEST_FRAMES,
     LEAST_MOTION_M,
     CopiedFrames,
     brief_runs,
+    slowness,
+    steps,
     without_copied_frames,
 )
-from kinertia.diagnostics.evidence.trajectory_faults import slowness, steps
 from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.limit import Limit

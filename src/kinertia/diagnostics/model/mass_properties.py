@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from kinertia.diagnostics.context import PersonContext
 from kinertia.diagnostics.model.model_check import (
     SIDE_COM_M,
     SIDE_MASS,
@@ -16,7 +17,6 @@ from kinertia.diagnostics.model.model_check import (
     check_model,
     side_differences,
 )
-from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.runner import check
 from kinertia.diagnostics.subject.mass import ERROR_SHARE, WARNING_SHARE
 from kinertia.estimation.prepare.prepared import estimated_bodies

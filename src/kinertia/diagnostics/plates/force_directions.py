@@ -1,5 +1,4 @@
-"""Do the forces point the right way? Rotated forces and reversed signs compete to explain forces that the motion
-contradicts.
+"""Are axes, signs and units of forces right? Rotated and reversed forces compete to explain contradictions.
 
 Forces integrated over time are the changes of the velocity of the centre of mass. The pelvis moves nearly like it in
 walking, and so does the marker-based centre when limbs swing (running), but not when the trunk bends (squats). Along
@@ -14,27 +13,26 @@ import numpy as np
 
 from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.horizontal_velocity import (
-    LEAST_CHANGE_M_S,
-    ForceVelocity,
-    VelocityChanges,
-    push_share,
-)
-from kinertia.diagnostics.evidence.horizontal_velocity_residual import (
+from kinertia.diagnostics.evidence.body_motion import (
     CLEARLY_BEST,
     DISTINGUISHABLE,
     HORIZONTAL,
+    LEAST_CHANGE_M_S,
+    ForceVelocity,
+    VelocityChanges,
     VelocityResidual,
     misread_plate_residuals,
+    push_share,
     rotated_residual,
 )
+from kinertia.diagnostics.evidence.force_mass import loaded_wrenches
 from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.rule import rule
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, free_moment
-from kinertia.trial.data import PlateLoads, Trial
+from kinertia.trial.data import LOAD_THRESHOLD_N, PlateLoads, Trial
 from kinertia.trial.sampled_data import rms, span_s
 
 _OPPOSED = Limit(-0.4, usual=(0.5, 1.0))
@@ -42,14 +40,17 @@ _CLEAR, _CLEAR_ROTATION, _ROTATED_DEG = 0.7, 0.35, 60.0
 _ONE_REVERSED, _LEAST_REVERSED_M_S, _LONG_WINDOW_S = Limit(0.65), 0.08, 1.0
 """Where one plate's sign is wrong, reversing it leaves 0.04 to 0.57 of the residual on five trials; on nine fault-free
 ones 0.9 (squats), 1.4 (runs) and more."""
-
 _ONE_MISREAD = Limit(0.8)
 """Where one plate's axes are exchanged or rotated, undoing it leaves 0.06 to 0.78 on 19 walks, on fault-free ones 1 and
 more."""
-
-
 _MUCH_SMALLER = Limit(0.5)
 _LEAST_PUSH, _USUAL_PUSH = 0.02, (0.08, 0.3)
+_VERTICAL_SHARE = 0.7
+"""Share of the largest force; a foot pushes sideways and backwards by less."""
+_WEAKEST_N = Limit(0.3)
+"""Smallest peak of a load in kN, or in multiples of body weight."""
+_LONGEST_ARM_M, _FEWEST = Limit(0.15, "m", usual=(0.0, 0.04)), 10
+"""Free moment over vertical force; so many samples under load, at least."""
 
 
 @dataclass(frozen=True)
@@ -292,3 +293,47 @@ def _angle(changes: VelocityChanges) -> tuple[float, float]:
     sizes = [max(float(np.linalg.norm(by_forces) * np.linalg.norm(part)), 1e-12) for part in shown]
     turn = sum(complex(np.vdot(part, by_forces)) / size for part, size in zip(shown, sizes, strict=True)) / len(shown)
     return float(np.degrees(np.angle(turn))), abs(turn)
+
+
+@check("P201", "P202", "P203", weakest=_WEAKEST_N, threshold=Limit(LOAD_THRESHOLD_N), lever_arm=_LONGEST_ARM_M)
+def axes_and_units(context: RecordingContext) -> Iterator[Finding]:
+    """Report P201 to P203: forces in other axes or other units, going by the plates alone."""
+    plates = context.plates
+    if plates is None:
+        return
+    x, y, z = (float(value) for value in np.abs(plates.force).max(axis=(0, 1), initial=0.0))
+    if y < _VERTICAL_SHARE * max(x, z):
+        yield finding(
+            "P201",
+            context.at(**context.along(0 if x > z else 2)),
+            peak_n=Quantity((x, y, z), "N"),
+            vertical=Quantity(context.recording.vertical),
+        )
+    peak = _peak_of_weak_loads(plates)
+    if peak is not None:
+        yield finding(
+            "P202",
+            context.at(),
+            peak_n=Quantity(peak, "N", limit=LOAD_THRESHOLD_N),
+            unit=Quantity("kN or multiples of body weight"),
+        )
+    for name, wrench in loaded_wrenches(plates, _FEWEST):
+        lever_arm_m = float(np.median(np.abs(free_moment(wrench)) / wrench[:, 1]))
+        if lever_arm_m > _LONGEST_ARM_M:
+            yield finding(
+                "P203",
+                context.at(plate=name),
+                lever_arm_m=Quantity(lever_arm_m, "m", limit=_LONGEST_ARM_M, usual=_LONGEST_ARM_M.usual),
+            )
+
+
+def _peak_of_weak_loads(plates: PlateLoads) -> float | None:
+    """Return the peak (N) where all loads are too small for a person and yet come and go as loads do; else None.
+
+    A plate that no one steps on shows noise of up to some newtons, and perhaps an offset or a drift.
+    """
+    unloaded = plates.unloaded or ()
+    peak = max((one.peak_n for one in unloaded), default=0.0)
+    if plates.force.any() or not _WEAKEST_N < peak < LOAD_THRESHOLD_N:
+        return None
+    return peak if any(one.like_steps and one.peak_n > _WEAKEST_N for one in unloaded) else None

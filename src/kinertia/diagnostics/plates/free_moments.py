@@ -21,8 +21,8 @@ import numpy as np
 
 from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.foot_trajectories import periods
 from kinertia.diagnostics.evidence.force_mass import carrying, loaded_wrenches
-from kinertia.diagnostics.evidence.strides import periods
 from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.limit import Limit

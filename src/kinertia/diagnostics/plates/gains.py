@@ -11,15 +11,15 @@ import numpy as np
 
 from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.horizontal_velocity import ForceVelocity
-from kinertia.diagnostics.evidence.horizontal_velocity_residual import (
+from kinertia.diagnostics.evidence.body_motion import (
     CLEARLY_BEST,
     HORIZONTAL,
+    ForceVelocity,
     Scaled,
     VelocityResidual,
     steady_scaled,
+    vertical_match_of,
 )
-from kinertia.diagnostics.evidence.vertical_acceleration import vertical_match_of
 from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, with_evidence
 from kinertia.findings.limit import Limit

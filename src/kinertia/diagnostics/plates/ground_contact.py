@@ -1,21 +1,38 @@
-"""Is ground contact complete, and the participant's alone? Loads sorted by foot, feet beside plates, other people."""
+"""Is ground contact complete, and the participant's alone? Who stands where and when, and is all of stance known?"""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 from kinertia.diagnostics import needs
-from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.context import PersonContext, RecordingContext
+from kinertia.diagnostics.evidence.ambiguous_loads import (
+    HALLUX_M,
+    NO_FOOT_M,
+    OTHERS_SHARE,
+    OUTSIDE_M,
+    OVERHANG_M,
+    STRAY_M,
+)
 from kinertia.diagnostics.evidence.force_mass import FOREIGN_S, FOREIGN_SHARE, MOSTLY
-from kinertia.diagnostics.evidence.plate_edges import HALLUX_M, NO_FOOT_M, OVERHANG_M
-from kinertia.diagnostics.evidence.shared_and_stray_loads import OTHERS_SHARE, OUTSIDE_M, STRAY_M
+from kinertia.diagnostics.plates.cop_positions import off_plate
 from kinertia.diagnostics.runner import check
+from kinertia.diagnostics.subject.movements import task_of
 from kinertia.errors import KinertiaError
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.motion.common_cutoff import LOWEST_HZ
 from kinertia.motion.kinematics import END_PERIODS, FEWEST_FRAMES, legs_on_plates
-from kinertia.trial.plate_assignment import FOOT_NAMES, SHORTEST_CONTACT_S, no_forces
-from kinertia.trial.sampled_data import within
+from kinertia.trial.data import FEET, BoolArray, FloatArray, Recording
+from kinertia.trial.ground_contact import FootMarkers, bridged
+from kinertia.trial.plate_assignment import FOOT_NAMES, SHORTEST_CONTACT_S, assign_plates, no_forces
+from kinertia.trial.sampled_data import runs, within
+from kinertia.trial.stances import LegCoverage, joined_coverage, leg_coverage, listed
+from kinertia.trial.trial_input import GAIT, Task
+
+_FOOT_NAMES = {"r": "right", "l": "left", None: "unknown foot"}
+_LISTED = 4
 
 
 @check(
@@ -140,3 +157,114 @@ def stray_loads(context: RecordingContext) -> Iterator[Finding]:
     for one in context.stray_contacts:
         where = context.at(plate=names[one.plate], span_s=(float(one.time[0]), float(one.time[-1])))
         yield finding("P285", where, distance_m=Quantity(one.distance_m, "m", limit=STRAY_M, usual=STRAY_M.usual))
+
+
+def coverage_of(context: RecordingContext) -> tuple[LegCoverage, ...]:
+    """Predict the part of stance and stride of each leg that will have joint moments; empty without strides."""
+    trial = context.trial_on_plates or context.trial
+    if trial is None or context.is_static or task_of(context) not in GAIT:
+        return ()
+    return leg_coverage(trial, trial.known_legs)
+
+
+@check("P272", "P289")
+def stance_coverage(context: PersonContext) -> Iterator[Finding]:
+    """Report P272: a phase of a leg's stance is on plates in no trial of a task; P289: hardly anything of it is.
+
+    Not where the user states the window of every trial.
+    """
+    by_task: dict[Task, list[RecordingContext]] = {}
+    for one in context.trials:
+        by_task.setdefault(task_of(one), []).append(one)
+    for task, trials in by_task.items():
+        if all(one.window_s is not None for one in trials):
+            continue
+        for leg in joined_coverage(map(coverage_of, trials)):
+            if leg.missing:
+                yield _finding(task, trials, leg)
+
+
+def _finding(task: Task, trials: Sequence[RecordingContext], leg: LegCoverage) -> Finding:
+    where = Where(trial=trials[0].name if len(trials) == 1 else None, part=f"{leg.word} leg, {task}")
+    evidence = {"side": Quantity(leg.word), "task": Quantity(task)}
+    if not leg.none:
+        evidence |= {"phase": Quantity(listed(leg.missing)), "known": Quantity(leg.ranges)}
+    return with_evidence("P289" if leg.none else "P272", where, evidence)
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Contact of one foot (None where the markers do not show which) with one plate."""
+
+    foot: str | None
+    start_s: float
+    end_s: float
+
+
+@dataclass(frozen=True)
+class PlateCheck:
+    """Summary of one force plate: its peak and who stands on it when.
+
+    Attributes:
+        name: as the recording has it.
+        peak_n: largest vertical force.
+        contacts: in the order of time.
+        outside_share: share of reliably loaded samples whose centre of pressure is off the plate; None where the file
+            has no corners or nothing is loaded.
+    """
+
+    name: str
+    peak_n: float
+    contacts: tuple[Contact, ...]
+    outside_share: float | None
+
+    def stood_on(self) -> str:
+        """Describe which foot was on the plate when; of many contacts, their number."""
+        if not self.contacts:
+            return "none"
+        phrases = []
+        for foot in dict.fromkeys(contact.foot for contact in self.contacts):
+            spans = [(contact.start_s, contact.end_s) for contact in self.contacts if contact.foot == foot]
+            listed = ", ".join(f"{start:.2f}-{end:.2f}" for start, end in spans)
+            if len(spans) > _LISTED:
+                listed = f"{len(spans)} contacts, {spans[0][0]:.2f}-{spans[-1][1]:.2f}"
+            phrases.append(f"{_FOOT_NAMES[foot]} {listed} s")
+        return "; ".join(phrases)
+
+
+def check_plates(recording: Recording, feet: FootMarkers | None) -> tuple[PlateCheck, ...]:
+    """Summarise every plate of a recording; without foot markers the contacts have no foot."""
+    if recording.plates is None:
+        return ()
+    return tuple(_check_plate(recording, p, feet) for p in range(len(recording.plates.names)))
+
+
+def _check_plate(recording: Recording, p: int, feet: FootMarkers | None) -> PlateCheck:
+    plates = recording.plates
+    assert plates is not None
+    vertical = plates.force[:, p, 1]
+    if feet is None:
+        contacts = _contacts(plates.time, vertical > 0, None)
+    else:
+        alone = replace(
+            plates,
+            names=plates.names[p : p + 1],
+            force=plates.force[:, p : p + 1],
+            moment=plates.moment[:, p : p + 1],
+            declared_feet=plates.declared_feet[p : p + 1],
+            corners=None,
+        )
+        loads = assign_plates(replace(recording, plates=alone), feet)[0]
+        contacts = [
+            contact
+            for foot, name in enumerate(FEET)
+            for contact in _contacts(loads.time, loads.force[:, foot, 1] > 0, name)
+        ]
+    share, _ = off_plate(plates, p) or (None, 0.0)
+    ordered = tuple(sorted(contacts, key=lambda contact: contact.start_s))
+    return PlateCheck(plates.names[p], float(vertical.max()), ordered, share)
+
+
+def _contacts(time: FloatArray, loaded: BoolArray, foot: str | None) -> list[Contact]:
+    spans = [(float(time[first]), float(time[last])) for first, last in runs(bridged(time, loaded))]
+    return [Contact(foot, start, end) for start, end in spans if end - start >= SHORTEST_CONTACT_S]

@@ -12,9 +12,8 @@ import numpy as np
 
 from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.body_motion import CLEARLY_BEST, HORIZONTAL, ForceVelocity, VelocityResidual
 from kinertia.diagnostics.evidence.force_mass import ADULT_KG, STEP_N
-from kinertia.diagnostics.evidence.horizontal_velocity import ForceVelocity
-from kinertia.diagnostics.evidence.horizontal_velocity_residual import CLEARLY_BEST, HORIZONTAL, VelocityResidual
 from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.limit import Limit

@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from kinertia.diagnostics.axes import Axes
 from kinertia.diagnostics.evidence.body_centre import owners_of
 from kinertia.diagnostics.evidence.force_mass import ForceMass, force_mass
+from kinertia.diagnostics.marker_context import Axes
 from kinertia.estimation.prepare.prepared import Prepared
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry

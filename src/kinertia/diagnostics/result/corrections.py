@@ -1,4 +1,4 @@
-"""Reports instrument errors that an estimate has corrected: their size, and how sure their cause is.
+"""Reports instrument errors that estimates have corrected, and instruments that differ within a session: S50.
 
 Where an error moves joint moments beyond their error bars and nothing contradicts it, the instrument is its cause.
 Otherwise the model may equally be the cause: soft tissue that lags looks like a delay of the forces, a trunk that bends
@@ -21,6 +21,7 @@ from kinertia.model.skeleton import GRAVITY_M_S2
 
 _FEWEST = 2
 """Equal errors of so many plates may be the error of all: of a single plate it is its own."""
+APART_SD = Limit(3.0)
 
 
 def reported(prior_sd: float, unit: str) -> Limit:
@@ -93,4 +94,29 @@ def zero_offsets(context: ResultContext) -> Iterator[Finding]:
                     float(np.arctan(np.sum(read_n) / (GRAVITY_M_S2 * context.ready.total_mass.total_kg))), "rad"
                 ),
                 zero_offset_n=Quantity(read_n, "N", limit=2.0 * own[0].prior_sd),
+            )
+
+
+def session_contradictions(
+    person: str, own: Sequence[CalibrationEntry], others: Sequence[CalibrationEntry]
+) -> Iterator[Finding]:
+    """Report S501: instrument errors that differ between one person's trials and the others' in a session.
+
+    Args:
+        person: name of the person.
+        own, others: errors of instruments by their trials.
+    """
+    by_others = {one.key: one for one in others}
+    for one in own:
+        other = by_others.get(one.key, one)
+        apart_sd = float(np.hypot(one.sd, other.sd))
+        if abs(one.value - other.value) > APART_SD * apart_sd:
+            yield finding(
+                "S501",
+                Where(plate=one.plate, part=f"{one} by {person}"),
+                error=Quantity(one.value, one.unit, sd=one.sd),
+                other_error=Quantity(other.value, one.unit, sd=other.sd),
+                sd=Quantity(apart_sd, one.unit, limit=APART_SD * apart_sd),
+                person=Quantity(person),
+                instrument=Quantity(str(one)),
             )

@@ -1,10 +1,8 @@
 """Lists the checks of an estimate, and of a result, as a list."""
 
-from kinertia.diagnostics.result.basis import basis, filters
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.corrections import delays, zero_offsets
 from kinertia.diagnostics.result.marker_errors import corrected_joints, moved_markers, sideways_lean
-from kinertia.diagnostics.result.masses import attached_items, forces_of_the_motion, total_mass
 from kinertia.diagnostics.result.plate_errors import (
     common_offset,
     free_moments,
@@ -14,7 +12,8 @@ from kinertia.diagnostics.result.plate_errors import (
     plate_rotation,
 )
 from kinertia.diagnostics.result.residuals import joint_angles, residuals
-from kinertia.diagnostics.result.soundness import soundness
+from kinertia.diagnostics.result.soundness import attached_items, forces_of_the_motion, soundness, total_mass
+from kinertia.diagnostics.result.suitability import basis, filters
 from kinertia.diagnostics.runner import Check, asked
 from kinertia.findings.finding import Finding
 

@@ -1,4 +1,4 @@
-"""R20, is the estimate sound? Checks convergence, physical possibility, and distance from the prior.
+"""R20, is the estimate sound? Convergence, physical possibility, distance from the prior, and masses: R10, S11, S40.
 
 If one side is heavier, the cause is the body or something worn on it, even if single parameters are far from the prior.
 If they are far without such a reason, a wrong joint, plate or marker is likelier than an unusual body.
@@ -10,7 +10,9 @@ import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.runner import check
+from kinertia.estimation.prepare.prepared import mass_by_force_kg
 from kinertia.estimation.result.fit import Fit
+from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import UNLIKE_CHANCE, OneSided, Unlikeness
 from kinertia.findings.display import first_few
 from kinertia.findings.finding import Finding, Severity, finding
@@ -18,7 +20,7 @@ from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.anatomy import segment_of
-from kinertia.model.bsp import PARAMETERS, impossible_segments
+from kinertia.model.bsp import PARAMETERS, BodySegmentParameters, impossible_segments
 
 CONTRADICTION_SD = Limit(3.0)
 """Prior SDs from which on a parameter contradicts what was expected."""
@@ -36,6 +38,12 @@ _ARMS = ("upper_arm", "forearm", "hand")
 _WRONG = "a misplaced marker or joint centre, or an error of a plate"
 _WORN = "something worn or carried that was not declared ([[attached]])"
 _OTHER = "a body that the tables do not describe (age_years, population under [subject])"
+_MOTION = Limit(0.05)
+"""Masses by force may differ by this share between inverse kinematics and the marker-based centre of mass."""
+_TOTAL = Limit(0.03)
+"""Share by which the estimated total mass may differ from the stated one."""
+_IDENTIFIED_SD = Limit(2.0)
+"""SDs of its mass from which on an attached item differs from nothing."""
 
 
 @check(
@@ -164,3 +172,54 @@ def _side_heavier(side: OneSided) -> Finding:
         heavier=Quantity(" and ".join(side.heavier)),
         lighter=Quantity(" and ".join(side.lighter)),
     )
+
+
+def mass_from_force_kg(literature: BodySegmentParameters, trial: TrialFit) -> float:
+    """Compute body mass (kg) from the vertical ground reaction of a fitted trial and its inverse kinematics."""
+    return mass_by_force_kg(literature, trial.kinematics.foot_loads, trial.residuals["literature"])
+
+
+@check("R107", share=_MOTION)
+def forces_of_the_motion(context: ResultContext) -> Iterator[Finding]:
+    """Report R107: trials whose forces give another body mass with the motion of inverse kinematics than with the
+    markers'."""
+    for trial in context.fit.trials:
+        by_markers = context.force_masses.get(trial.name)
+        if by_markers is None:
+            continue
+        by_motion_kg = mass_from_force_kg(context.ready.literature, trial)
+        limit = _MOTION * by_markers.mass_kg + 2.0 * by_markers.sd_kg
+        if abs(by_motion_kg - by_markers.mass_kg) > limit:
+            yield finding(
+                "R107",
+                Where(trial=trial.name),
+                by_motion_kg=Quantity(by_motion_kg, "kg", limit=limit),
+                by_markers_kg=Quantity(by_markers.mass_kg, "kg", sd=by_markers.sd_kg),
+            )
+
+
+@check("S113", share=_TOTAL)
+def total_mass(context: ResultContext) -> Iterator[Finding]:
+    """Report S113: an estimated total mass that follows the plates more than the stated mass."""
+    total_kg, stated = context.fit.estimate.total_mass_kg, context.ready.total_mass
+    limit = _TOTAL * stated.total_kg + 2.0 * stated.sd_kg
+    if abs(total_kg - stated.total_kg) > limit:
+        yield finding(
+            "S113",
+            estimate_kg=Quantity(total_kg, "kg", limit=limit),
+            stated_kg=Quantity(stated.total_kg, "kg", sd=stated.sd_kg),
+        )
+
+
+@check("S407", distance=_IDENTIFIED_SD)
+def attached_items(context: ResultContext) -> Iterator[Finding]:
+    """Report S407: attached items of unknown mass that the trials cannot distinguish from zero."""
+    estimate, posterior = context.fit.estimate, context.fit.posterior
+    for item in () if posterior is None else context.ready.attached:
+        row = estimate.segments.index(item.name)
+        mass_kg, sd_kg = float(estimate.mass_kg[row]), float(posterior.sd[row, 0]) if posterior else 0.0
+        if item.mass_kg is None and mass_kg < _IDENTIFIED_SD * sd_kg:
+            mass = Quantity(mass_kg, "kg", limit=_IDENTIFIED_SD * sd_kg, sd=sd_kg)
+            yield finding(
+                "S407", Where(part=item.name), mass_kg=mass, sd=Quantity(sd_kg, "kg"), name=Quantity(item.name)
+            )

@@ -1,20 +1,25 @@
-"""Rates the fitness of each output for its use, with a reason and a number.
+"""Rates the fitness of each output for its use; R11 and R40 report what a result is based on.
 
 Findings judge the estimate as a whole; here their consequences for each output are derived: an ERROR that affects it
 means "do not use", a WARNING "use with care".
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
 
+from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.soundness import expected_source
+from kinertia.diagnostics.runner import check
 from kinertia.estimation.identifiability import INFORMED, MEASURED
 from kinertia.estimation.result.fit import Fit
-from kinertia.estimation.result.leg_moments import coverage_sentence
-from kinertia.findings.finding import Finding, Severity
+from kinertia.estimation.result.leg_moments import coverage_sentence, forces_used
+from kinertia.findings.finding import Finding, Severity, finding, with_evidence
+from kinertia.findings.limit import Limit
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.trial.sampled_data import rms, rms_length
 
 Use = Literal["use", "use with care", "do not use"]
@@ -22,6 +27,8 @@ _ORDER: tuple[Use, ...] = ("use", "use with care", "do not use")
 SHOWN_SHARE = 0.5
 """Share of parameters that the data inform from which a table of them is this person's, if they inform any well."""
 _BAND_SD = 1.96
+_LEAST_SHARE = Limit(0.01)
+"""Frames with less weight, from which share on they are mentioned."""
 
 
 class Group(NamedTuple):
@@ -232,3 +239,33 @@ def _half_interval(fit: Fit, of: Literal["moments", "coordinates"]) -> float | N
 
 
 _REASONS: Mapping[str, Callable[[Fit], str]] = {"moments": _moments, "motion": _motion}
+
+
+@check("R111", "R112", share=_LEAST_SHARE)
+def filters(context: ResultContext) -> Iterator[Finding]:
+    """Report R111 and R112: a cutoff that was chosen (R111), and impacts that were given less weight (R112)."""
+    for trial in context.fit.trials if context.fit.settings.cutoff_hz == "gcv" else ():
+        yield finding("R111", Where(trial=trial.name), cutoff_hz=Quantity(trial.kinematics.cutoff_hz, "Hz"))
+    posterior = context.fit.posterior
+    shares = () if posterior is None else posterior.down_weighted
+    for trial, share in zip(context.fit.trials, shares, strict=False):
+        if share > _LEAST_SHARE:
+            yield finding("R112", Where(trial=trial.name), share=Quantity(share, "1", limit=_LEAST_SHARE))
+
+
+@check("R402", "R403", "R404")
+def basis(context: ResultContext) -> Iterator[Finding]:
+    """Report which part of the result rests on assumptions, or on the prior."""
+    fit = context.fit
+    for trial in fit.trials:
+        used = forces_used(trial.reactions, fit.settings, trial.motion_hz)
+        impact = Quantity(trial.reactions.impact_n, "N")
+        yield finding("R402", Where(trial=trial.name), which=Quantity(used.which), impact_n=impact)
+    if fit.posterior is None:
+        yield finding("R403")
+    for output, group in GROUPS.items():
+        shown = informed(fit, output)
+        if shown is not None and shown.informed < SHOWN_SHARE * shown.total:
+            counts = {"shown": Quantity(shown.informed, "1"), "count": Quantity(shown.total, "1")}
+            words = {"group": Quantity(group.nouns), "values": Quantity(prior_values(fit))}
+            yield with_evidence("R404", Where(part=group.nouns), counts | words)

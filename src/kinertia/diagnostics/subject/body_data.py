@@ -13,8 +13,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.person_context import PersonContext
+from kinertia.diagnostics.context import PersonContext, RecordingContext
 from kinertia.diagnostics.runner import check
 from kinertia.diagnostics.subject.mass import weighed_as_stated
 from kinertia.estimation.prior import population_of

@@ -14,8 +14,8 @@ from itertools import combinations
 
 import numpy as np
 
+from kinertia.diagnostics.context import PersonContext, odd_ones
 from kinertia.diagnostics.evidence.force_mass import MISSING, MOSTLY, UNMEASURED_S, ForceMass, UnmeasuredSupport
-from kinertia.diagnostics.person_context import PersonContext, odd_ones
 from kinertia.diagnostics.runner import check
 from kinertia.estimation.prepare.prepared import TotalMass
 from kinertia.findings.finding import Finding, Severity, finding

@@ -1,4 +1,4 @@
-"""What does a person do in the trials: walk, turn, run, land, squat? Do they include what complements walking best?
+"""What does a person do: stand, walk, turn, run, land, squat? Do the movements include what complements walking best?
 
 In the synthetic laboratory, adding a trial of trunk sway lowers the errors of moments of inertia by a third, more than
 any other movement (`kinertia plan` predicts both for a person's own trials).
@@ -10,13 +10,15 @@ from typing import Self
 
 import numpy as np
 
-from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.person_context import PersonContext
+from kinertia.diagnostics.context import PersonContext, RecordingContext
 from kinertia.diagnostics.runner import check
+from kinertia.estimation.simultaneous.instruments.priors import JOINT_CENTRE_SD_M, WITHOUT_STATIC
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
+from kinertia.motion.stance_pose import hidden_landmarks
 from kinertia.trial.data import BoolArray, Markers
+from kinertia.trial.marker_quality import LEAST_WALK_M, STANDING_RANGE_M, still_span_s
 from kinertia.trial.sampled_data import runs, span_s
 from kinertia.trial.trial_input import Task
 
@@ -26,6 +28,8 @@ _FLIGHT_S = 0.03
 """Shortest flight of a run; contacts by markers are uncertain by about as much."""
 _LANDING_S = 0.1
 """Shortest flight before a landing: walking has none."""
+_FLAT_M = Limit(0.04, "m", usual=(0.0, 0.012))
+"""Heels, and metatarsals, of seven people who stand are up to 12 mm higher on one side than on the other."""
 
 
 @dataclass(frozen=True)
@@ -145,3 +149,53 @@ def _flights(time: np.ndarray, ground: BoolArray, least_s: float) -> list[tuple[
     """Return first and last frame of the flights between two contacts that last so long."""
     air = runs(~np.logical_or.reduce(ground, axis=1))
     return [(a, b) for a, b in air if a > 0 and b < len(time) - 1 and span_s(time, a - 1, b + 1) > least_s]
+
+
+@check("S201", walk=Limit(LEAST_WALK_M, "m"))
+def standing(context: RecordingContext) -> Iterator[Finding]:
+    """Report S201: a person who walks in the static trial, with the part in which they stand."""
+    if context.travel.kind != "walks":
+        return
+    distance = Quantity(context.travel.distance_m, "m", limit=LEAST_WALK_M, usual=(0.0, STANDING_RANGE_M))
+    span = still_span_s(context.markers)
+    action = "Give the standing trial, or none"
+    if span is not None:
+        action = f"Use the part in which the person stands: window_s = [{span[0]:.2f}, {span[1]:.2f}] under [model]"
+    yield finding("S201", context.at(span_s=span), distance_m=distance, action=Quantity(action))
+
+
+@check("S207", "S208")
+def no_static(context: PersonContext) -> Iterator[Finding]:
+    """Report S207: there is neither a static trial nor a model, and a walk replaces them; S208: no walk can."""
+    unread = any(one.rule.stage == "file" and one.where.trial is None for one in context.found)
+    if not context.trials or context.standing or context.model or context.files_only or unread:
+        return
+    yield finding("S207", centre_sd_m=Quantity(WITHOUT_STATIC * JOINT_CENTRE_SD_M, "m"))
+    measured = [one.recording for one in context.trials if one.recording.plates is not None]
+    if measured and context.marker_set and (hidden := hidden_landmarks(measured[0].markers, context.marker_set)):
+        yield finding("S208", landmarks=Quantity(", ".join(hidden)))
+
+
+@check("S202", apart=_FLAT_M)
+def flat_feet(context: RecordingContext) -> Iterator[Finding]:
+    """Report S202: a foot that is not on the floor like the other; foot axes assume that the foot is flat on the
+    floor."""
+    if context.marker_set is None:
+        return
+    apart = {}
+    for name in ("heel", "metatarsal"):
+        labels = (context.marker_set.landmarks.get(f"{name}_{side}", ())[:1] for side in "rl")
+        heights = [context.all_markers.arranged(own)[..., 1] for own in labels]
+        if all(np.isfinite(each).any() for each in heights):
+            right_m, left_m = (float(np.nanmedian(each)) for each in heights)
+            apart[name] = right_m - left_m
+    if not apart:
+        return
+    landmark, higher_m = max(apart.items(), key=lambda one: abs(one[1]))
+    if abs(higher_m) >= _FLAT_M:
+        yield finding(
+            "S202",
+            context.at(part="right foot" if higher_m > 0 else "left foot"),
+            difference_m=Quantity(abs(higher_m), "m", limit=_FLAT_M, usual=_FLAT_M.usual),
+            landmark=Quantity(landmark),
+        )

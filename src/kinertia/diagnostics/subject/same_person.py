@@ -13,12 +13,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.label_exchange import swapped_labels
-from kinertia.diagnostics.evidence.segment_distances import FEWEST_PAIRS, SAME_SESSION_M, SegmentDistances
-from kinertia.diagnostics.person_context import PersonContext, odd_ones
+from kinertia.diagnostics.context import PersonContext, RecordingContext, odd_ones
+from kinertia.diagnostics.evidence.segment_distances import (
+    FEWEST_PAIRS,
+    SAME_SESSION_M,
+    SegmentDistances,
+    swapped_labels,
+)
 from kinertia.diagnostics.runner import check
-from kinertia.diagnostics.subject.camera_scale import AGAINST_STANDING, ERRORS, FAR_M, OTHER_SCALE, camera_scale
+from kinertia.diagnostics.subject.same_session import AGAINST_STANDING, ERRORS, FAR_M, OTHER_SCALE, camera_scale
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity

@@ -13,10 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.contact_fit import FITS_M, ContactFit, Feet, Hypothesis
 from kinertia.diagnostics.evidence.plate_contacts import (
     CONTACT_FORCE_N,
     FAR_M,
+    FITS_M,
+    ContactFit,
+    Feet,
+    Hypothesis,
     PlateContact,
     contacts_of,
     cop_horizontal,

@@ -1,4 +1,4 @@
-"""T20 and T21, do forces keep time with the markers: their rate, the delay of one plate, and that of all trials?
+"""T20 and T21, do forces keep time with the markers? Do events of the file, and the belt's speed, fit the feet?
 
 The vertical velocity from the markers follows the force-derived one with a delay: the synchronisation delay of the
 forces, and some ms added by skin, trunk and arms, which are the same in all movements. Between trials of one person
@@ -23,18 +23,32 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.diagnostics import needs
-from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.horizontal_velocity import ForceVelocity, joined_without_trend
-from kinertia.diagnostics.evidence.vertical_acceleration import LARGEST_RESIDUAL, vertical_match_of
-from kinertia.diagnostics.person_context import PersonContext
+from kinertia.diagnostics.context import PersonContext, RecordingContext
+from kinertia.diagnostics.evidence.body_motion import (
+    LARGEST_RESIDUAL,
+    ForceVelocity,
+    joined_without_trend,
+    vertical_match_of,
+)
+from kinertia.diagnostics.evidence.foot_trajectories import LEAST_BELT_M_S, standing_speeds
 from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N
-from kinertia.trial.data import FloatArray
+from kinertia.trial.data import FEET, FloatArray, Trial
+from kinertia.trial.file_contents import GaitEvent
+from kinertia.trial.plate_assignment import FOOT_NAMES
 from kinertia.trial.sampled_data import span_s
+from kinertia.trial.stances import (
+    EVENT_LIMIT_S,
+    contradicted_events,
+    counted_from_first_frame,
+    events_of_other_foot,
+    gait_events,
+    sides_exchanged,
+)
 
 _LEAST_WINDOW_S = 0.8
 """Parts of half a second of one trial differ by up to 40 ms."""
@@ -55,6 +69,9 @@ _LEAST_RATE_WINDOW_S, _LEAST_GROWTH = 1.0, Limit(0.0105, usual=(-0.004, 0.004))
 1.3 s and by up to 0.002 in longer ones, and by both in one direction by at most 0.004."""
 _LEAST_RATIO, _MOST_RATIO, _TYPICAL_RATIO = Limit(0.4, usual=(0.67, 0.99)), Limit(1.8), 0.9
 """On 26 fault-free trials, from squats to runs; at half the true rate it is four times as much."""
+_APART = Limit(0.25)
+"""Share by which a stated speed may differ from the one of standing feet, which roll."""
+_KM_H = 3.6
 
 
 class TrialDelay(NamedTuple):
@@ -254,3 +271,87 @@ def _growing_delays(context: RecordingContext) -> Iterator[Finding]:
             rate_error=Quantity(mean, "1", limit=_LEAST_GROWTH, usual=_LEAST_GROWTH.usual),
             method=Quantity("vertical velocity"),
         )
+
+
+@check("T311", "T312", "T313", "T314", apart=Limit(EVENT_LIMIT_S, "s"))
+def file_events(context: RecordingContext) -> Iterator[Finding]:
+    """Report T311 to T314: the event of a file farthest from its forces (T311), events with sides exchanged, all of
+    them (T312) or a few (T313), or times that count from the first frame (T314).
+    """
+    trial = context.loaded
+    if not isinstance(trial, Trial):
+        return
+    count = sum(one.of_gait is not None for one in trial.events)
+    if counted_from_first_frame(trial):
+        first = Quantity(float(trial.markers.time[0]), "s")
+        yield finding("T314", context.at(), events=Quantity(count, "1"), first_s=first)
+        return
+    if sides_exchanged(trial):
+        yield finding("T312", context.at(), events=Quantity(count, "1"))
+        return
+    other_foot = events_of_other_foot(trial.events, [*gait_events(trial), *_by_motion(context)])
+    for one in other_foot[:1]:
+        yield finding(
+            "T313",
+            context.at(),
+            event=Quantity(one.label),
+            foot=Quantity(FOOT_NAMES[FEET.index(one.side)]),
+            other_foot=Quantity(FOOT_NAMES[1 - FEET.index(one.side)]),
+            time_s=Quantity(one.time_s, "s"),
+            events=Quantity(len(other_foot), "1"),
+        )
+    apart = contradicted_events(trial)
+    if apart:
+        stated, shown = max(apart, key=lambda pair: abs(pair[0].time_s - pair[1].time_s))
+        difference = stated.time_s - shown.time_s
+        yield finding(
+            "T311",
+            context.at(),
+            event=Quantity(stated.label),
+            foot=Quantity(FOOT_NAMES[FEET.index(stated.side)]),
+            time_s=Quantity(stated.time_s, "s"),
+            difference_s=Quantity(difference, "s", limit=EVENT_LIMIT_S),
+            apart_s=Quantity(abs(difference), "s"),
+            direction=Quantity("after" if difference > 0.0 else "before"),
+            events=Quantity(len(apart), "1"),
+        )
+
+
+def _by_motion(context: RecordingContext) -> Iterator[GaitEvent]:
+    """Detect foot strikes and foot offs as the beginning and end of stance phases that the trial shows."""
+    for side, foot in zip(FEET, context.foot_trajectories or (), strict=False):
+        for start, end, _ in foot.stance_spans:
+            if start > foot.time[0]:
+                yield GaitEvent(start, side, "heel strike")
+            if end < foot.time[-1]:
+                yield GaitEvent(end, side, "toe off")
+
+
+@check("T301", apart=_APART, slow=Limit(LEAST_BELT_M_S, "m/s"))
+def belt_speed(context: RecordingContext) -> Iterator[Finding]:
+    """Report T301: a stated belt speed that differs from the speed of feet in stance; of two feet, the larger error."""
+    belt, time = context.recording.belt, context.all_markers.time
+    if belt is None or context.feet is None:
+        return
+    speeds = standing_speeds(context.all_markers, context.feet)
+    if speeds is None:
+        return
+    stated = [belt.under(foot).distance_m(*time[[0, -1]]) / float(np.ptp(time)) for foot in range(2)]
+    pairs = list(zip(stated, speeds, strict=True))
+    excess = [abs(one - other) / max(_APART * max(one, other), LEAST_BELT_M_S) for one, other in pairs]
+    worst = int(np.argmax(excess))
+    if excess[worst] <= 1.0:
+        return
+    causes: tuple[str, ...] = ()
+    if belt.speed_m_s.ndim == 2 and np.abs(np.subtract(stated, speeds[::-1])).max() < LEAST_BELT_M_S:
+        causes = ("right and left belt interchanged",)
+    elif abs(stated[worst] / max(speeds[worst], 1e-9) / _KM_H - 1) < _APART:
+        causes = ("a speed in km/h",)
+    yield finding(
+        "T301",
+        context.at(),
+        causes=causes,
+        stated_m_s=Quantity(stated[worst], "m/s"),
+        feet_m_s=Quantity(speeds[worst], "m/s"),
+        foot=Quantity(FOOT_NAMES[worst] if belt.speed_m_s.ndim == 2 else "either"),
+    )

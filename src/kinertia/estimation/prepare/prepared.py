@@ -10,6 +10,7 @@ from kinertia.errors import PriorError, SettingsError, SubjectError, TrialError,
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.instruments.priors import ModelUncertainty
 from kinertia.findings.finding import Finding, finding, with_evidence
+from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.file_names import trouble_as_folders
@@ -30,6 +31,12 @@ _LIGHTEST_KG = 10.0
 """Least plausible mass of a person (`check_subject`)."""
 LIGHT_KG = 0.5
 """Groups of bodies with less total mass than this move with their joints, but are not estimated."""
+CALIBRATED_M = Limit(0.03, "m")
+"""By which calibration moves markers at most; preparation reports more."""
+KNOWN_BODY_SD = Limit(3.0)
+"""SDs from the prior that a stated segment, or a body built from measures, may be away."""
+MODEL_MASS_SHARE = Limit(0.002)
+"""By which a model's mass is scaled without a word."""
 
 
 @dataclass(frozen=True)

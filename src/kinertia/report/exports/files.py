@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.diagnostics.result.masses import mass_from_force_kg
+from kinertia.diagnostics.result.soundness import mass_from_force_kg
 from kinertia.diagnostics.result.suitability import suitability
 from kinertia.estimation.identifiability import BaseParameters
 from kinertia.estimation.result.cycles import columns_of, peak_columns, phase_columns, spatiotemporal_columns

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.diagnostics.plates.plate_summary import Contact
+from kinertia.diagnostics.plates.ground_contact import Contact
 from kinertia.findings.finding import Finding
 from kinertia.findings.overview import Overview, reported
 from kinertia.io.results.output_folder import complete_folder

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import upright_model as upright
-from kinertia.diagnostics.model.joint_frames import mirrored_joints
+from kinertia.diagnostics.model.geometry import mirrored_joints
 from kinertia.io.opensim.reader import read_osim
 from kinertia.model.joint_centres import subtalar_axis
 from kinertia.model.skeleton import Joint, Skeleton

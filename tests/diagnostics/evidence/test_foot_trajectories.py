@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory
-from kinertia.diagnostics.evidence.strides import periods, swing_in_turn
+from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory, periods, swing_in_turn
 from kinertia.trial.data import FootLoads
 from loads_and_feet import context_of
 from recordings import is_here

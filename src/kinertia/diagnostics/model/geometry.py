@@ -1,4 +1,4 @@
-"""Are a model's joints those of people? Left mirrors right, and the subtalar axis points forward, up and inward.
+"""Are a model's lengths in metres, and its joints those of people?
 
 A pair of joints is compared in ground axes and in the axes of the bodies that carry them, and the better of the two
 counts: the axes of bodies may be chosen freely on each side, and a skewed joint further up is not the fault of this
@@ -10,18 +10,19 @@ a mistake, most often a lost orientation.
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from kinertia.diagnostics.person_context import PersonContext
+from kinertia.diagnostics.context import PersonContext
 from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.limit import Limit
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.model.bsp import FloatArray
+from kinertia.model.bsp import BodySegmentParameters, FloatArray
 from kinertia.model.neutral_joints import NeutralJoints, angle_deg, mirrored, neutral_joints
+from kinertia.model.skeleton import Skeleton
 
 _AXIS_RAD = Limit(np.radians(5.0), "rad", usual=(0.0, 0.0))
 """Fault-free models: 0.0 degrees. The left subtalar joint with the right one's frames: 13.9."""
@@ -32,6 +33,12 @@ _FARTHEST_RAD = Limit(np.radians(25.0), "rad", usual=(0.0, 0.21))
 """Models in use: 0.0 degrees. An axis along the foot: 38."""
 _USUAL = (0.7872, 0.6047, -0.1209)
 """Forward, up, to the right: of a right foot, as gait2354 and Rajagopal have it."""
+_FARTHEST_M = Limit(1.5, "m")
+"""Longest body from its joint: a thigh has half a metre, the end of a barbell is 1.1 m from its middle."""
+_SMALLEST_M, _LARGEST_M = Limit(0.2, "m"), Limit(3.0, "m")
+"""Largest distance of two joints of a whole body: a newborn's legs, and a giant's stretched arms."""
+_WHOLE = 6
+"""Joints from which on a model counts as a whole body."""
 
 
 @check("O302", "O303", unless=("O301",), axis=_AXIS_RAD, position=_POSITION_M)
@@ -163,3 +170,58 @@ def _usual(neutral: NeutralJoints, body: str) -> np.ndarray:
     ahead = np.cross([0.0, 1.0, 0.0], to_right)
     inward = right if body.endswith("_r") else -right
     return np.asarray(forward * ahead + up * np.array([0.0, 1.0, 0.0]) + inward * to_right)
+
+
+@check("O301", farthest=_FARTHEST_M, smallest=_SMALLEST_M, largest=_LARGEST_M)
+def length_unit(context: PersonContext) -> Iterator[Finding]:
+    """Report O301: joints, centres of mass or markers that are not in metres; the finding identifies the farthest."""
+    if context.model is None:
+        return
+    skeleton = context.model.skeleton
+    lengths = _lengths(skeleton, context.model.bsp)
+    extent_m = _extent_m(skeleton)
+    extent = Quantity(extent_m, "m", usual=(_SMALLEST_M, _LARGEST_M))
+    if wrong := sorted(((length, what) for length, what in lengths if length > _FARTHEST_M), reverse=True):
+        length_m, what = wrong[0]
+        farthest = Quantity(length_m, "m", limit=_FARTHEST_M)
+        count = Quantity(len(wrong), "1")
+        yield finding("O301", length_m=farthest, extent_m=extent, count=count, what=Quantity(what))
+    elif len(skeleton.joints) >= _WHOLE and not _SMALLEST_M <= extent_m <= _LARGEST_M:
+        what = "The largest distance between two joints"
+        yield finding("O301", length_m=extent, extent_m=extent, what=Quantity(what))
+
+
+def _lengths(skeleton: Skeleton, bsp: BodySegmentParameters) -> list[tuple[float, str]]:
+    """List lengths (m) within bodies, and what each belongs to."""
+    joints = _joints(skeleton)
+    lengths = []
+    for body, places in joints.items():
+        apart = max(float(np.linalg.norm(place - places[0])) for place in places)
+        lengths.append((apart, f"The distance between the joints of body {body}"))
+    for body, mass, centre in zip(bsp.segments, bsp.mass_kg, bsp.com_m, strict=True):
+        off = _nearest_m(centre, joints.get(body, [])) if mass > 0 else 0.0
+        lengths.append((off, f"The distance between the centre of mass of body {body} and its joints"))
+    for marker in skeleton.markers:
+        off = _nearest_m(marker.position, joints.get(marker.segment, []))
+        lengths.append((off, f"The distance of marker {marker.label} from the joints of its body {marker.segment}"))
+    return lengths
+
+
+def _joints(skeleton: Skeleton) -> dict[str, list[np.ndarray]]:
+    """Return by body the joints (3,) m that it carries and its own, in its frame; the root's own may be anywhere."""
+    joints: dict[str, list[np.ndarray]] = {}
+    for joint in skeleton.joints:
+        if joint.parent != "ground":
+            joints.setdefault(joint.parent, []).append(np.asarray(joint.translation))
+            joints.setdefault(joint.child, []).append(np.asarray(joint.child_translation))
+    return joints
+
+
+def _nearest_m(place: np.ndarray, joints: Sequence[np.ndarray]) -> float:
+    return min((float(np.linalg.norm(place - joint)) for joint in joints), default=0.0)
+
+
+def _extent_m(skeleton: Skeleton) -> float:
+    """Return the largest distance (m) between two bodies' origins with all coordinates at zero."""
+    places = skeleton.pose(np.zeros((1, len(skeleton.coordinates)))).translation[0]
+    return float(np.linalg.norm(places[:, None] - places[None], axis=-1).max())

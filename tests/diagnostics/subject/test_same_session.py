@@ -5,8 +5,8 @@ from itertools import permutations
 import pytest
 
 from kinertia.diagnostics.evidence.segment_distances import SegmentDistances
-from kinertia.diagnostics.subject.camera_scale import AGAINST_STANDING, camera_scale, trial_scales
 from kinertia.diagnostics.subject.same_person import static_and_trials
+from kinertia.diagnostics.subject.same_session import AGAINST_STANDING, camera_scale, trial_scales
 from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
 from people import codes, person, scaled, with_markers
 from recordings import here, named_here
