@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.motion.gait_cycle import contact_phases
+from kinertia.motion.gait_cycle import contact_phases, found_events
 from kinertia.motion.joint_moments import component_names
 
 
@@ -24,6 +24,16 @@ def test_only_stances_on_plates_that_are_part_of_no_stride(fit):
         assert not [s for s in strides if s.side == one.side and abs(s.start_s - one.start_s) < 0.1]
     every = contact_phases(trial.skeleton, trial.kinematics, ())
     assert len(every) > len(phases), "without strides all stances are phases of their own"
+
+
+def test_the_other_foot_of_a_stance_has_the_times_of_its_events(fit):
+    (trial,) = fit.trials
+    events = [one.event for one in found_events(trial.skeleton, trial.kinematics)]
+    for one in contact_phases(trial.skeleton, trial.kinematics, ()):
+        other = {"r": "l", "l": "r"}[one.side]
+        for time_s, kind in ((one.opposite_toe_off_s, "toe off"), (one.opposite_strike_s, "heel strike")):
+            near = [event.time_s for event in events if event[1:] == (other, kind) and abs(event.time_s - time_s) < 0.1]
+            assert time_s in near
 
 
 def test_no_phase_that_the_motion_does_not_cover(fit):

@@ -38,6 +38,16 @@ def test_stances_have_their_times_and_those_cut_by_the_record_take_as_long_as_ot
     assert stances_of(cut)[2].start_s == pytest.approx(-0.4)
 
 
+def test_contacts_of_plates_are_not_rounded_to_frames():
+    fine = np.arange(0.0, 3.0, 0.001)
+    force = np.zeros((len(fine), 2, 3))
+    force[(fine >= 0.4965) & (fine < 1.1035), 0, 1] = 500.0
+    one = replace(WALK, loads=FootLoads(fine, force, np.zeros_like(force)))
+    first, second, *_ = stances_of(one)
+    assert (first.start_s, first.end_s) == pytest.approx((0.497, 1.103))
+    assert (second.start_s, second.end_s) == (1.5, 2.1), "without a plate"
+
+
 def test_standing_and_touching_are_no_stances():
     assert stances_of(trial([(0.0, 3.0)], [(0.0, 3.0)])) == ()
     assert stances_of(trial([(1.0, 1.05)])) == ()

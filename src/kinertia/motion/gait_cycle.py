@@ -291,12 +291,16 @@ def contact_phases(skeleton: Skeleton, kinematics: Kinematics, strides: Sequence
         return ()
     found = _landings(skeleton, kinematics) if trial.task == "landing" else _stances(trial, strides)
     result: list[Stride] = []
+    events: list[GaitEvent] | None = None
     shown_from, shown_to = kinematics.spline.time[[0, -1]]
     for side, phase, start, end in found:
         if start < shown_from or end > shown_to:
             continue
         number = 1 + sum(one.side == side for one in result)
-        other = _other_foot(trial, side, start, end) if phase == "stance" else (np.nan, np.nan)
+        other = np.nan, np.nan
+        if phase == "stance":
+            events = [one.event for one in found_events(skeleton, kinematics)] if events is None else events
+            other = _other_foot(trial, events, side, start, end)
         result.append(Stride(side, number, start, end, end, *other, True, phase))
     return tuple(result)
 
@@ -309,8 +313,13 @@ def _stances(trial: Trial, strides: Sequence[Stride]) -> Iterator[tuple[str, Pha
             yield one.side, "stance", one.start_s, one.end_s
 
 
-def _other_foot(trial: Trial, side: str, start_s: float, end_s: float) -> tuple[float, float]:
-    """Return when the other foot leaves the ground in a stance, and when it is back; NaN where it does not."""
+def _other_foot(
+    trial: Trial, events: Sequence[GaitEvent], side: str, start_s: float, end_s: float
+) -> tuple[float, float]:
+    """Return when the other foot leaves the ground in a stance, and when it is back; NaN where it does not.
+
+    Where there is an event, which is not rounded to frames, its time is used.
+    """
     assert trial.on_ground is not None  # else there are no stances
     own = within(trial.markers.time, start_s, end_s)
     time, ground = trial.markers.time[own], trial.on_ground[own, 1 - FEET.index(side)]
@@ -318,7 +327,14 @@ def _other_foot(trial: Trial, side: str, start_s: float, end_s: float) -> tuple[
     if not len(swing):
         return np.nan, np.nan
     lifts = float(time[swing[0]]) if swing[0] > 0 else np.nan
-    return lifts, float(time[swing[-1] + 1]) if swing[-1] + 1 < len(time) else np.nan
+    lands = float(time[swing[-1] + 1]) if swing[-1] + 1 < len(time) else np.nan
+    other = FEET[1 - FEET.index(side)]
+    inside = [event for event in events if start_s < event.time_s < end_s]
+    off, strike = (
+        nearest_event(inside, frame, _SAME_EVENT_S) or frame
+        for frame in (GaitEvent(lifts, other, "toe off"), GaitEvent(lands, other, "heel strike"))
+    )
+    return off.time_s, strike.time_s
 
 
 def _landings(skeleton: Skeleton, kinematics: Kinematics) -> Iterator[tuple[str, Phase, float, float]]:

@@ -85,11 +85,12 @@ def stances_of(trial: Trial) -> tuple[Stance, ...]:
 def _by_plates(trial: Trial, foot: int, first: int, last: int) -> tuple[float, float]:
     """Return the times (s) of foot contact and foot off: of the load, if these frames differ from it by little."""
     start, end = (float(trial.markers.time[k]) for k in (first, last))
-    own = trial.loads.time[within(trial.loads.time, start, end)]
-    loaded = own[trial.loads.force[within(trial.loads.time, start, end), foot, 1] >= LOAD_THRESHOLD_N]
+    near = within(trial.loads.time, start - _SAME_CONTACT_S, end + _SAME_CONTACT_S)
+    own = trial.loads.time[near]
+    loaded = own[trial.loads.force[near, foot, 1] >= LOAD_THRESHOLD_N]
     if len(loaded):
-        start = float(loaded[0]) if loaded[0] - start <= _SAME_CONTACT_S else start
-        end = float(loaded[-1]) if end - loaded[-1] <= _SAME_CONTACT_S else end
+        start = float(loaded[0]) if own[0] < loaded[0] <= start + _SAME_CONTACT_S else start
+        end = float(loaded[-1]) if end - _SAME_CONTACT_S <= loaded[-1] < own[-1] else end
     return start, end
 
 
