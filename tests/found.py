@@ -3,8 +3,7 @@
 from dataclasses import replace
 
 from kinertia.findings.finding import Severity, finding, with_evidence
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 
 ALONG_Z = {"axis": "mediolateral", "file_axis": "Z"}
 ZERO = finding(

@@ -29,8 +29,8 @@ from kinertia.io.c3d import ezc3d_library
 from kinertia.io.c3d import reader as c3d
 from kinertia.io.ground_forces import read_forces
 from kinertia.io.marker_set_file import read_marker_set
-from kinertia.io.opensim.exporter import export_osim
 from kinertia.io.opensim.reader import read_osim
+from kinertia.io.opensim.writer import export_osim
 from kinertia.io.recording import read_recording
 from kinertia.io.subject.reader import read_subject
 from kinertia.io.text.sto import TimeTable, read_table, write_table

@@ -8,8 +8,8 @@ import numpy as np
 
 from kinertia.diagnostics.labels.swapped_markers import rigidity
 from kinertia.diagnostics.markers.axes_and_floor import unit_and_vertical
-from kinertia.diagnostics.markers.frames import frames
 from kinertia.diagnostics.markers.trajectories import precision, trajectories, visible
+from kinertia.diagnostics.markers.unmeasured_data import frames
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import Markers
 from marker_contexts import context_of

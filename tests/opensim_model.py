@@ -5,8 +5,8 @@ from pathlib import Path
 
 import opensim as osim
 
-from kinertia.io.opensim.exporter import export_osim
 from kinertia.io.opensim.reader import read_osim
+from kinertia.io.opensim.writer import export_osim
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from osim_oracle import OsimOracle

@@ -17,7 +17,7 @@ from kinertia.diagnostics.subject.same_session import trial_scales
 from kinertia.diagnostics.timing import contact_delays, force_timing
 from kinertia.diagnostics.timing.force_timing import TrialDelay, force_rate, uneven_delays
 from kinertia.estimation.prepare.prepared import TotalMass
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Where
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import Markers, Recording
 from marker_contexts import context_of

@@ -8,8 +8,8 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.registry import LOADED_CHECKS, SIGNAL_CHECKS
 from kinertia.diagnostics.runner import asked, explained
 from kinertia.io.marker_set_file import choose_marker_set
-from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import Markers, Recording
+from kinertia.trial.ground_contact import centre_of_pressure
 
 MARKERS = Markers(np.arange(2) / 100, ("A", "B"), np.zeros((2, 2, 3)))
 

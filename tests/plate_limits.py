@@ -14,7 +14,7 @@ from kinertia.diagnostics.plates.ground_contact import stray_loads
 from kinertia.diagnostics.plates.plate_positions import repeated_plates
 from kinertia.diagnostics.plates.signals import dead_moments, low_passed, mains_interference, quantisation, signals
 from kinertia.diagnostics.plates.zeros import zeros
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Where
 from kinertia.trial.data import PlateLoads
 from kinertia.trial.plate_signals import UnloadedReading
 from plate_findings import plates_alone

@@ -11,8 +11,7 @@ from kinertia.diagnostics.model.mass_properties import inertia_size, mass_unit, 
 from kinertia.diagnostics.model.model_on_person import model_and_trials
 from kinertia.diagnostics.result import plate_errors, residuals, soundness
 from kinertia.diagnostics.result.corrections import delays, session_contradictions, zero_offsets
-from kinertia.diagnostics.result.marker_errors import moved_markers
-from kinertia.diagnostics.result.residuals import residuals_of
+from kinertia.diagnostics.result.residuals import moved_markers, residuals_of
 from kinertia.estimation.prepare.prepared import TotalMass
 from kinertia.estimation.simultaneous.calibration_entry import DELAY, FREE_MOMENT, GAIN, POSITION, ROTATION, ZERO
 from kinertia.estimation.simultaneous.instruments.priors import (
@@ -24,7 +23,7 @@ from kinertia.estimation.simultaneous.instruments.priors import (
     ZERO_PRIOR_N,
     InstrumentPrior,
 )
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Where
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
 from kinertia.model.marker_set import MarkerSet
 from kinertia.synthetic.walk import walking_subject
@@ -139,7 +138,7 @@ def marker_off(distance_m, at_shoulder=False):
 
 
 def shoulders():
-    from kinertia.diagnostics.result.marker_errors import _at_shoulders
+    from kinertia.diagnostics.result.residuals import _at_shoulders
 
     return _at_shoulders(walking_subject().skeleton)
 

@@ -11,7 +11,7 @@ from kinertia.cohort.tables import write_findings, write_person, write_tables
 from kinertia.errors import BlockedError
 from kinertia.estimation.result.fit import Fit
 from kinertia.findings.finding import finding
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Where
 from kinertia.io.versions import VERSION
 from kinertia.model.bsp import PARAMETERS
 from kinertia.studies.cross_validation import Explained, HeldOut

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from kinertia.io.c3d.writer import write_c3d
-from kinertia.io.opensim.exporter import export_osim
+from kinertia.io.opensim.writer import export_osim
 from kinertia.io.text.sto import write_sto
 from kinertia.io.text.trc import write_trc
 from kinertia.model.anthropometry import literature_bsp

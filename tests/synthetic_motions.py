@@ -15,8 +15,8 @@ from kinertia.motion.pose_fit import Stop, fit_poses
 from kinertia.synthetic.laboratory import camera_noise
 from kinertia.synthetic.motions import squat
 from kinertia.synthetic.walk import SyntheticSubject, SyntheticTrial, walk
-from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N, Markers, PlateLoads, Recording
+from kinertia.trial.ground_contact import centre_of_pressure
 
 CAMERA_SD_M, FORCE_SD_N, MOMENT_SD_NM = 0.0005, 1.0, 0.2
 LONG_WALK_S, LONG_WALK_START, LOAD_RATE_HZ, SAMPLES_PER_FRAME = 3.7, 0.75, 1000.0, 10

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from kinertia.estimation.study_parameters import ParameterVector
+from kinertia.estimation.identifiability import ParameterVector
 from kinertia.model.bsp import BodySegmentParameters
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
-from kinertia.diagnostics.evidence.body_centre import bridged_trajectory
+from kinertia.diagnostics.evidence.landmarks import bridged_trajectory
 from kinertia.model.joint_centres import find_landmarks, hip_in_pelvis, pelvis_frame
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, Markers
 from validation.measured_person import MeasuredPerson

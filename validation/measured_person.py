@@ -17,8 +17,8 @@ from kinertia.io.text.trc import write_trc
 from kinertia.model.marker_set import MarkerSet
 from kinertia.settings import Subject
 from kinertia.synthetic.laboratory import force_table
-from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import FloatArray, Markers, PlateLoads, Recording
+from kinertia.trial.ground_contact import centre_of_pressure
 
 _IDLE_SD_N, _IDLE_SD_NM = 1.0, 0.1
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from kinertia.estimation.identifiability import ParameterVector
 from kinertia.estimation.prior import BspPrior, with_symmetry
 from kinertia.estimation.simultaneous.linear_algebra.motion_basis import Bandwidth
 from kinertia.estimation.simultaneous.observation import Observation
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
-from kinertia.estimation.study_parameters import ParameterVector
 from kinertia.estimation.two_level import Window, estimate_two_level
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import Motion

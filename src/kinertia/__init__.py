@@ -43,9 +43,9 @@ if TYPE_CHECKING:
     from kinertia.findings.finding import Severity as Severity
     from kinertia.findings.finding import finding as finding
     from kinertia.findings.quantity import Quantity as Quantity
+    from kinertia.findings.quantity import Where as Where
     from kinertia.findings.rule import Rule as Rule
     from kinertia.findings.rule import rule as rule
-    from kinertia.findings.where import Where as Where
     from kinertia.io.b3d import read_b3d as read_b3d
     from kinertia.io.marker_set_file import choose_marker_set as choose_marker_set
     from kinertia.io.marker_set_file import read_marker_set as read_marker_set
@@ -104,9 +104,8 @@ _ROOMS = {
     ),
     "findings.extensions": "RulePackage",
     "findings.finding": "Finding Severity finding",
-    "findings.quantity": "Quantity",
+    "findings.quantity": "Quantity Where",
     "findings.rule": "Rule rule",
-    "findings.where": "Where",
     "settings": "Attached Instruments Overrule Settings Subject",
     "trial.data": "FootLoads Markers PlateLoads Recording Trial",
     "trial.plate_assignment": "build_trial",

@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import Self
 
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 
 
 def problem_of(found: Finding) -> str:

@@ -10,7 +10,7 @@ from kinertia.cli.findings_view import next_commands, show_all
 from kinertia.cli.terminal import out
 from kinertia.errors import MarkerSetError, SubjectError
 from kinertia.findings.finding import finding
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Where
 from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
 from kinertia.io.subject.tables import Model
 from kinertia.model.gait27 import build_gait27

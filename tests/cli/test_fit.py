@@ -9,8 +9,7 @@ import pytest
 from command_line import run, run_apart
 from kinertia.errors import BlockedError, FileError
 from kinertia.findings.finding import finding
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 
 
 @pytest.fixture

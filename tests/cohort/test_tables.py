@@ -14,7 +14,7 @@ from kinertia.cohort.record import Place, Record
 from kinertia.cohort.tables import write_findings, write_person, write_tables
 from kinertia.errors import BlockedError
 from kinertia.findings.finding import finding
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Where
 from kinertia.io.versions import VERSION
 
 FOUND = (

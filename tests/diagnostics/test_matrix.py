@@ -13,8 +13,8 @@ import pytest
 
 from kinertia.diagnostics.runner import blocking, explained
 from kinertia.findings.finding import Severity, finding
+from kinertia.findings.quantity import Where
 from kinertia.findings.rule import all_rules, matching
-from kinertia.findings.where import Where
 from kinertia.trial.data import Markers
 from kinertia.workflow.check import check_recording
 from recordings import RUNS, WALKS

@@ -5,9 +5,8 @@ from hypothesis import strategies as st
 
 from kinertia.diagnostics.runner import Check, asked, blocking, explained, overruled, unknown_codes
 from kinertia.findings.finding import Severity, finding
-from kinertia.findings.quantity import Quantity
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.findings.rule import all_rules
-from kinertia.findings.where import Where
 from kinertia.settings import Overrule
 
 PLACES = st.builds(Where, trial=st.sampled_from([None, "walk", "run"]), plate=st.sampled_from([None, "left", "right"]))

@@ -16,7 +16,7 @@ from kinertia.estimation.simultaneous.calibration_entry import POSITION, Calibra
 from kinertia.estimation.simultaneous.instruments.instrument_errors import ANOTHER_TRIAL, OTHER_SIGN
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
 from kinertia.motion.dynamics import residual
-from kinertia.trial.centre_of_pressure import held_centre_of_pressure
+from kinertia.trial.ground_contact import held_centre_of_pressure
 
 
 def turned(fit, factor=-1.0):

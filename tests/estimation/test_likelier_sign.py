@@ -22,7 +22,7 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import Kinematics
 from kinertia.synthetic.laboratory import camera_noise
 from kinertia.synthetic.walk import walk, walking_subject
-from kinertia.trial.centre_of_pressure import free_moment
+from kinertia.trial.ground_contact import free_moment
 from recordings import slow_beside
 from results import entry_of
 from validation.synthetic_walks import kinematics_of

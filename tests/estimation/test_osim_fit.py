@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 
 from command_line import fitted, run
-from kinertia.io.opensim.exporter import export_osim
 from kinertia.io.opensim.reader import read_osim
+from kinertia.io.opensim.writer import export_osim
 from kinertia.io.text.sto import read_sto
 from kinertia.io.text.trc import read_trc
 from kinertia.motion.kinematics import inside

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from generic_static import generic_model, smooth_motion
-from kinertia.estimation.study_parameters import ParameterVector
+from kinertia.estimation.identifiability import ParameterVector
 from kinertia.estimation.two_level import (
     LONGEST_INTERVAL_S,
     Integration,

@@ -3,8 +3,7 @@
 import pytest
 
 from kinertia.findings.display import axis_text, filled, first_few, outlined, shown
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 
 
 @pytest.mark.parametrize(

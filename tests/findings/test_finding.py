@@ -8,9 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kinertia.findings.finding import Severity, finding
-from kinertia.findings.quantity import Quantity
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.findings.rule import all_rules, rule
-from kinertia.findings.where import Where
 
 _LABELS = st.lists(st.sampled_from("ABCD"), max_size=3, unique=True).map(tuple)
 _SPANS = st.tuples(st.floats(0, 9), st.floats(0, 9)).map(lambda ends: tuple(sorted(ends)))

@@ -9,9 +9,8 @@ import re
 from pathlib import Path
 
 from kinertia.findings.display import filled
-from kinertia.findings.quantity import Quantity
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.findings.rule import Rule, all_rules
-from kinertia.findings.where import Where
 
 MESSAGES = Path(__file__).with_name("messages.txt")
 PLACE = Where("walk.c3d", 7, "walk", "plate 1", "fore-aft", "X", ("RKNE", "LKNE"), "shank_r", (0.5, 1.25))

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 from kinertia.findings.finding import Severity, finding
 from kinertia.findings.overview import DO_NOT_USE, USE, WITH_CARE, Overview, grouped
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 
 FROZEN = [finding("M113", Where(trial="walk", markers=(label,))) for label in ("RKNE", "LKNE", "RANK")]
 SPIKES = finding("M111", Where(trial="walk", markers=("RTOE",)), Severity.ERROR, distance_m=Quantity(0.3, "m"))

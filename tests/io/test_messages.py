@@ -5,8 +5,7 @@ import pytest
 import fuzz
 from kinertia.errors import FileError
 from kinertia.findings.finding import finding
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.subject.reader import read_subject
 from kinertia.io.text.trc import read_trc
 

@@ -9,8 +9,7 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.markers.axes_and_floor import unit_and_vertical
 from kinertia.errors import TrialError
 from kinertia.findings.finding import finding
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.recording import read_recording
 from kinertia.io.text.sto import write_sto
 from kinertia.io.text.trc import write_trc

@@ -5,7 +5,7 @@ import pytest
 
 from kinertia.io.c3d.reader import read_c3d
 from kinertia.io.marker_set_file import read_marker_set
-from kinertia.model.alignment_device import device_labels, with_alignment_device, with_knees_of_device
+from kinertia.model.static_landmarks import device_labels, with_alignment_device, with_knees_of_device
 from kinertia.trial.data import Markers, Recording
 from recordings import here
 from refusals import codes

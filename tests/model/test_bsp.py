@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kinertia.estimation.study_parameters import ParameterVector
+from kinertia.estimation.identifiability import ParameterVector
 from kinertia.model.bsp import MIRROR_SIGNS, PARAMETERS, BodySegmentParameters, combine
 from pinocchio_model import pin
 

@@ -6,8 +6,8 @@ from scipy.interpolate import CubicSpline
 
 from kinertia.motion.ground_reactions import ground_reactions, measured_reactions
 from kinertia.motion.smoothing import smooth
-from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import FootLoads
+from kinertia.trial.ground_contact import centre_of_pressure
 
 RATE_HZ, WEIGHT_N = 1000.0, 700.0
 TIME = np.arange(2000) / RATE_HZ

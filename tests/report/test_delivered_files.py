@@ -14,8 +14,8 @@ from command_line import fitted
 from kinertia.io.ground_forces import read_forces
 from kinertia.io.text.sto import TimeTable, read_sto, write_table
 from kinertia.report.exports.opensim_files import FORCES_FILE, LOADS_FILE
-from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N
+from kinertia.trial.ground_contact import centre_of_pressure
 from osim_tools import inverse_dynamics_tool
 from validation.walks import fit_arguments
 

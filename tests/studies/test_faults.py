@@ -8,9 +8,8 @@ import pytest
 from found import FAULTY
 from kinertia.errors import BlockedError
 from kinertia.findings.finding import Severity, finding
-from kinertia.findings.quantity import Quantity
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.findings.rule import all_rules
-from kinertia.findings.where import Where
 from kinertia.io.subject.reader import read_subject
 from kinertia.workflow.from_files import prepare_subject
 from one_process import in_one_process

@@ -7,7 +7,7 @@ from unittest import mock
 import numpy as np
 import pytest
 
-from kinertia.estimation.study_parameters import ParameterVector
+from kinertia.estimation.identifiability import ParameterVector
 from kinertia.studies.parallel import in_parallel
 from kinertia.studies.table1 import (
     CONDITIONS,

@@ -4,7 +4,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from kinertia.estimation.study_parameters import ParameterVector
+from kinertia.estimation.identifiability import ParameterVector
 from kinertia.estimation.two_level import TwoLevelProblem, Window
 from kinertia.motion.dynamics import residual
 from kinertia.motion.inverse_kinematics import solve_ik

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from kinertia.errors import KinertiaError
-from kinertia.estimation.study_parameters import ParameterVector
+from kinertia.estimation.identifiability import ParameterVector
 from kinertia.estimation.two_level import correct_pelvis
 from kinertia.io.subject.reader import read_subject
 from kinertia.model.bsp import BodySegmentParameters

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from kinertia.trial.load_bandwidth import load_bandwidth_hz
+from kinertia.motion.ground_reactions import load_bandwidth_hz
 
 RATE_HZ = 1000.0
 TIME = np.arange(2400) / RATE_HZ

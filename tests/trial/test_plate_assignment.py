@@ -5,8 +5,7 @@ import pytest
 
 from kinertia.errors import MarkerSetError, TrialError
 from kinertia.findings.finding import finding
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.trial.data import FootLoads, Markers, PlateLoads, Recording
 from kinertia.trial.file_contents import StatedContact
 from kinertia.trial.ground_contact import CONTACT_MARGIN_S, CONTACT_SLACK_S, ground_contact

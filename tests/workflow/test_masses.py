@@ -16,8 +16,7 @@ from kinertia.estimation.simultaneous.linear_algebra.motion_basis import Bandwid
 from kinertia.estimation.simultaneous.observation import observe
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.findings.finding import Severity, finding
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import inverse_dynamics, residual
 from kinertia.settings import Attached, KnownSegment, PriorSettings, Settings, Subject

@@ -7,8 +7,8 @@ import pytest
 from kinertia.errors import BlockedError, OsimError, SubjectError
 from kinertia.estimation.prior import MASS_SD, OTHER_MASS_SD
 from kinertia.findings.finding import Severity
-from kinertia.io.opensim.exporter import export_osim
 from kinertia.io.opensim.reader import read_osim
+from kinertia.io.opensim.writer import export_osim
 from kinertia.io.text.trc import read_trc
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.imported_model import OsimModel

@@ -7,7 +7,7 @@ import pytest
 
 from kinertia.errors import SettingsError
 from kinertia.findings.finding import Severity, finding
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Where
 from kinertia.settings import Subject
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow import built_in_model as module

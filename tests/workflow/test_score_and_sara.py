@@ -13,7 +13,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from kinertia import Settings, Subject, TrialInput, estimate, prepare
-from kinertia.model.coordinate_pairs import skin_angles
+from kinertia.model.skeleton import skin_angles
 from kinertia.synthetic.laboratory import PERFECT, SkinMotion, camera_noise, record
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.data import Markers, Recording

@@ -30,6 +30,7 @@ from kinertia.cli.options import (
 )
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.errors import FileError
+from kinertia.estimation.prepare.prepared import Progress
 from kinertia.findings.overview import Overview
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.opensim.reader import read_osim
@@ -49,7 +50,7 @@ from kinertia.workflow.check import (
     read_files,
     trial_names,
 )
-from kinertia.workflow.person import Person, Progress, read_person
+from kinertia.workflow.person import Person, read_person
 
 
 @dataclass(frozen=True, eq=False)

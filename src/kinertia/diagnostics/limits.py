@@ -20,7 +20,7 @@ from kinertia.diagnostics.runner import Check
 from kinertia.estimation.body_measures import FAR_SD
 from kinertia.estimation.prepare.prepared import CALIBRATED_M, KNOWN_BODY_SD, LIGHT_KG, MODEL_MASS_SHARE
 from kinertia.findings.display import exact
-from kinertia.findings.limit import Limit
+from kinertia.findings.quantity import Limit
 from kinertia.findings.rule import Rule
 from kinertia.io.c3d.reader import PERSON_M
 from kinertia.io.lab_plates import MOMENTS_FIT

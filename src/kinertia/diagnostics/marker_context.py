@@ -10,7 +10,7 @@ import numpy as np
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory, foot_trajectories
 from kinertia.diagnostics.evidence.landmarks import CLEAR, headings, landmark_positions, most_forwards
 from kinertia.diagnostics.evidence.trajectory_faults import without_copied_frames
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Where
 from kinertia.io.lab_plates import ground_rotation
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import FloatArray, Markers, Recording

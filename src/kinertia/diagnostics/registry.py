@@ -8,9 +8,8 @@ from kinertia.diagnostics.labels.anatomy import anatomy, direction_of_travel, he
 from kinertia.diagnostics.labels.marker_set import labels_match, landmarks
 from kinertia.diagnostics.labels.swapped_markers import label_swaps, rigidity
 from kinertia.diagnostics.markers.axes_and_floor import floor, floor_slope, unit_and_vertical
-from kinertia.diagnostics.markers.computed_markers import computed_markers
-from kinertia.diagnostics.markers.frames import frames
 from kinertia.diagnostics.markers.trajectories import absent_markers, over_smoothed, precision, trajectories, visible
+from kinertia.diagnostics.markers.unmeasured_data import computed_markers, frames
 from kinertia.diagnostics.model.geometry import length_unit, mirrored_joints, subtalar_axis
 from kinertia.diagnostics.model.mass_properties import (
     arms_in_torso,

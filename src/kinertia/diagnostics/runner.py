@@ -13,9 +13,8 @@ from typing import Any, Generic, TypeVar
 
 from kinertia.findings.extensions import RULES, loaded, names
 from kinertia.findings.finding import Finding, Severity
-from kinertia.findings.limit import Limit
+from kinertia.findings.quantity import Limit, Where
 from kinertia.findings.rule import FAMILIES, matching, rule
-from kinertia.findings.where import Where
 from kinertia.settings import Overrule
 
 Context = TypeVar("Context")

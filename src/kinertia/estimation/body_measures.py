@@ -27,8 +27,7 @@ import numpy as np
 from kinertia.errors import PriorError
 from kinertia.estimation.prior import BspPrior, updated
 from kinertia.findings.finding import Finding, Severity, with_evidence
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.model.stadium_body import (

@@ -29,7 +29,7 @@ from kinertia.estimation.simultaneous.mixture_prior import FaultMixture
 from kinertia.estimation.simultaneous.uncertainty.evidence import FreeMomentSign
 from kinertia.motion.dynamics import residual
 from kinertia.motion.kinematics import Kinematics
-from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, free_moment, with_turned_free_moments
+from kinertia.trial.ground_contact import FIRM_LOAD_N, free_moment, with_turned_free_moments
 from kinertia.trial.sampled_data import rms
 
 _LARGE = 0.5

@@ -38,11 +38,10 @@ from kinertia.errors import PriorError
 from kinertia.estimation.prior import BspPrior, literature_prior, population_prior
 from kinertia.estimation.result.fit import Fit
 from kinertia.findings.finding import with_evidence
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.subject.learnt_files import PopulationFile
 from kinertia.model.bsp import BodySegmentParameters, dynamic_by_table
-from kinertia.model.coordinate_pairs import by_side
+from kinertia.model.skeleton import by_side
 
 BETWEEN, WITHIN = 0.4, 1.0
 """Variances of a group's mean about the tables, and of its people about their mean, relative to the literature's."""

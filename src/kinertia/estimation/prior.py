@@ -44,8 +44,7 @@ from scipy.linalg import block_diag
 
 from kinertia.errors import PriorError
 from kinertia.findings.finding import Finding, Severity, with_evidence
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.model.bsp import MIRROR_SIGNS, PARAMETERS, BodySegmentParameters, inertia_of, second_moments
 from kinertia.model.log_cholesky import nearest_consistent
 from kinertia.settings import Subject

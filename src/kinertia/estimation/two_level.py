@@ -21,7 +21,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
-from kinertia.estimation.study_parameters import ParameterVector
+from kinertia.estimation.identifiability import ParameterVector
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, consistent_root_acceleration, residual, root_derivatives, root_regressor

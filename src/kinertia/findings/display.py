@@ -5,8 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 
 _FIELD = re.compile(r"\{(\w+)(?::([+%#]*))?\}")
 _UNIT_SUFFIX = re.compile(r"_(?:m_s|nm_n|kg_m3|kg|nm|rad|hz|sd|n|m|s)$")

@@ -11,9 +11,8 @@ from enum import IntEnum
 from typing import Any, Literal, Self
 
 from kinertia.findings.display import filled
-from kinertia.findings.quantity import Quantity
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.findings.rule import Rule, rule
-from kinertia.findings.where import Where
 
 Status = Literal["open", "waived", "ignored"]
 

@@ -24,19 +24,17 @@ import numpy as np
 
 from kinertia.errors import FileError
 from kinertia.findings.finding import Finding, finding, with_evidence
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.file_names import path_from
 from kinertia.io.text.number_table import expect_file, mismatch, uniform_times
 from kinertia.io.text.sto import TimeTable, read_table
 from kinertia.model.anatomy import segment_of
-from kinertia.trial.centre_of_pressure import FIRM_LOAD_N
 from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray, PlateLoads
 from kinertia.trial.file_contents import TorqueColumns
-from kinertia.trial.impossible_data import impossible_load
+from kinertia.trial.ground_contact import FIRM_LOAD_N
 from kinertia.trial.plate_loading import PlateLoad, joined, largest_n, without_unloaded_level
 from kinertia.trial.plate_signals import without_spikes
-from kinertia.trial.sampled_data import rms
+from kinertia.trial.sampled_data import impossible_load, rms
 
 _FOOT_WORDS = {"r": "r", "right": "r", "l": "l", "left": "l"}
 _FEWEST = 20

@@ -18,13 +18,12 @@ import numpy as np
 
 from kinertia.errors import FileError
 from kinertia.findings.finding import Finding, finding, with_evidence
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray, PlateLoads
-from kinertia.trial.impossible_data import impossible_load
 from kinertia.trial.marker_quality import UPRIGHT_SHARE
 from kinertia.trial.plate_loading import joined, largest_n, without_unloaded_level
 from kinertia.trial.plate_signals import without_spikes
+from kinertia.trial.sampled_data import impossible_load
 
 MOMENTS_FIT = 0.05
 """Moments agree with the centre of pressure if they miss it by no more than this share (RMS)."""

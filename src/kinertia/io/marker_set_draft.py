@@ -12,11 +12,10 @@ from kinertia.errors import MarkerSetError
 from kinertia.io.marker_positions.placement import Placement, place_markers
 from kinertia.io.marker_set_file import marker_set_of, nearest_preset, preset_names, read_marker_set
 from kinertia.io.text.toml_lines import quoted
-from kinertia.model.alignment_device import with_alignment_device
 from kinertia.model.gait27 import build_gait27
 from kinertia.model.joint_centres import find_landmarks
 from kinertia.model.marker_set import LANDMARKS, SEGMENTS, WIDTHS, MarkerSet, folded, label_share
-from kinertia.model.static_landmarks import departures
+from kinertia.model.static_landmarks import departures, with_alignment_device
 from kinertia.trial.data import Recording
 
 _NEAR = 0.85

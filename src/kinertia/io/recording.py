@@ -8,15 +8,14 @@ import numpy as np
 from kinertia.errors import FileError, KinertiaError, TrialError
 from kinertia.findings.extensions import READERS, loaded, names
 from kinertia.findings.finding import Finding, finding
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.ground_forces import read_forces
 from kinertia.io.lab_plates import upright_along_z
 from kinertia.io.text.number_table import expect_file, wrong_kind
 from kinertia.io.text.trc import read_trc_recording
-from kinertia.model.alignment_device import with_knees_of_device
+from kinertia.model.static_landmarks import with_knees_of_device
 from kinertia.trial.data import FloatArray, PlateLoads, Recording
-from kinertia.trial.impossible_data import impossible_load, impossible_position
+from kinertia.trial.sampled_data import impossible_load, impossible_position
 
 ADDED_FILES = tuple(f".{name}" for name in names(READERS))
 MARKER_FILES = (".trc", ".c3d", ".tsv", ".csv", *ADDED_FILES)

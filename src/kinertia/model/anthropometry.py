@@ -20,8 +20,7 @@ import numpy as np
 
 from kinertia.errors import SubjectError, problem_of
 from kinertia.findings.finding import finding
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.model.bsp import MIRROR_SIGNS, BodySegmentParameters, FloatArray, combine
 
 SEGMENTS = (

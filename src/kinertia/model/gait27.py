@@ -19,8 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from kinertia.errors import MarkerSetError, problem_of
 from kinertia.findings.finding import finding
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.model import joint_centres as jc
 from kinertia.model.anthropometry import BodyGeometry
 from kinertia.model.coordinate_range import Range

@@ -13,10 +13,9 @@ import numpy as np
 
 from kinertia.errors import MarkerSetError, problem_of
 from kinertia.findings.finding import finding
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
-from kinertia.model.coordinate_pairs import mirrored
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.model.marker_set import MarkerSet, nearest_labels
+from kinertia.model.skeleton import mirrored
 from kinertia.trial.data import Recording
 
 MARKER_RADIUS_M = 0.007

@@ -35,8 +35,7 @@ import numpy as np
 
 from kinertia.errors import PriorError, how_to_install
 from kinertia.findings.finding import Severity, with_evidence
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.model.bsp import BodySegmentParameters, FloatArray, combine
 
 KINDS = ("pelvis", "torso", "thigh_r", "shank_r", "foot_r", "upper_arm_r", "forearm_r")

@@ -18,12 +18,11 @@ import numpy as np
 
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import LONGEST_BRIDGE_S, Kinematics
-from kinertia.motion.moving_windows import gaussian_mean
 from kinertia.motion.workload import pieces
 from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, Trial
 from kinertia.trial.file_contents import GaitEvent, nearest_event
 from kinertia.trial.ground_contact import CONTACT_SLACK_S, bridged
-from kinertia.trial.sampled_data import TIME_TOLERANCE_S, runs, within
+from kinertia.trial.sampled_data import TIME_TOLERANCE_S, gaussian_mean, runs, within
 from kinertia.trial.stances import gait_events, load_edges, stances_of, usable_events
 
 PERCENT = np.arange(101.0)

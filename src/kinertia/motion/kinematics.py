@@ -15,8 +15,7 @@ import numpy as np
 
 from kinertia.errors import MarkerSetError, TrialError
 from kinertia.findings.finding import Finding, finding
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.common_cutoff import Cutoff, common_cutoff

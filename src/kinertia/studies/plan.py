@@ -30,7 +30,7 @@ from kinertia.estimation.simultaneous.linear_algebra.motion_basis import Bandwid
 from kinertia.estimation.simultaneous.linear_algebra.normal_equations import StaticInformation
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.search.problem import MapProblem
-from kinertia.estimation.simultaneous.terms.calibration_terms import as_displaced
+from kinertia.estimation.simultaneous.terms.model_terms import as_displaced
 from kinertia.model.bsp import PARAMETERS, UNITS
 from kinertia.model.log_cholesky import table_jacobian
 from kinertia.model.skeleton import Skeleton

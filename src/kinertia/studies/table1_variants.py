@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
-from kinertia.estimation.study_parameters import ParameterVector
+from kinertia.estimation.identifiability import ParameterVector
 from kinertia.estimation.two_level import TwoLevelProblem, Window, radius_of_gyration, trust_scale, vector_bounds
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton

@@ -24,11 +24,10 @@ from kinertia.errors import TrialError
 from kinertia.io.results.output_folder import complete_folder
 from kinertia.io.text.sto import write_sto
 from kinertia.io.text.trc import write_trc
-from kinertia.model.coordinate_pairs import skin_angles
-from kinertia.model.skeleton import Skeleton
+from kinertia.model.skeleton import Skeleton, skin_angles
 from kinertia.synthetic.walk import HEIGHT_M, MASS_KG, SEX, SyntheticSubject, SyntheticTrial
-from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, Markers, PlateLoads, Recording
+from kinertia.trial.ground_contact import centre_of_pressure
 from kinertia.trial.sampled_data import runs
 
 PLATE_SIZE_M = (0.6, 0.4)

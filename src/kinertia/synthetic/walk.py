@@ -29,8 +29,8 @@ from kinertia.model.gait27 import build_gait27
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, consistent_root_acceleration, residual
-from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import Markers, Recording
+from kinertia.trial.ground_contact import centre_of_pressure
 
 MASS_KG, HEIGHT_M, SEX = 72.6, 1.803, "male"
 """The walker: the subject of OpenSim's gait2354 example."""

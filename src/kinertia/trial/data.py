@@ -18,13 +18,11 @@ import numpy.typing as npt
 
 from kinertia.errors import MarkerSetError, TrialError
 from kinertia.findings.finding import Finding, Severity, finding
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.trial.display import of_report
 from kinertia.trial.file_contents import Belt, FileEvent, FileOutputs, StatedContact, TorqueColumns
-from kinertia.trial.impossible_data import impossible_markers, impossible_plates
 from kinertia.trial.plate_signals import ForceSpike, UnloadedReading
-from kinertia.trial.sampled_data import nearest_samples, windows, within
+from kinertia.trial.sampled_data import impossible_markers, impossible_plates, nearest_samples, windows, within
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]

@@ -7,8 +7,7 @@ import numpy as np
 
 from kinertia.errors import MarkerSetError, problem_of
 from kinertia.findings.finding import finding
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.trial.data import BoolArray, FloatArray, Markers
 from kinertia.trial.file_contents import Belt
 from kinertia.trial.sampled_data import runs, span_s, within

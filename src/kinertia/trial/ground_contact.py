@@ -1,11 +1,11 @@
-"""Finds the frames in which all ground contact is measured.
+"""Finds the frames in which all ground contact is measured, and where on the ground a foot's load acts.
 
 A foot without load counts as on the ground by thresholds of this trial: the heights and speeds of foot markers when the
 load on a plate begins or ends.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -17,16 +17,12 @@ from kinertia.trial.sampled_data import TIME_TOLERANCE_S, nearest_samples, runs,
 
 BRIDGED_GAP_S = 0.02
 """Gaps in a load shorter than this are bridged: it counts as one contact."""
-
 CONTACT_SLACK_S = 0.04
 """Largest error of landing and leaving times derived from markers, compared with plates (typically 0.015 s)."""
-
 CONTACT_MARGIN_S = 0.02
 """Ground contact off the plates is extended by this on both sides: a missed first contact makes the dynamics wrong."""
-
 LONGEST_FLIGHT_S = 1.0
 """Longest plausible flight phase: beyond it something other than the feet supports the person."""
-
 # Below these, markers of a stationary foot differ by noise only.
 _LEAST_CLEARANCE_M = 0.01
 _LEAST_SPEED_M_S = 0.1
@@ -35,19 +31,17 @@ _FEWEST_TO_JUDGE, _OUTLIER_FACTOR = 3, 3.0
 _STANCE, _SLOW_LANDING = 0.9, 2.0
 """With fewer, which may be slow by chance, a foot has landed that is as slow as in this share of the frames under load,
 if it is at most so many times as fast as the landings."""
-
 _STEP_S = 0.1
 """A load that begins and ends within less is of a toe that brushes over the plate: it shows no landing."""
-
 _ALL_CARRIED = 0.85
 """While plates carry this share of their usual load, a foot that does not move is in the air."""
-
 _BETWEEN, _BETWEEN_FRAMES = 0.3, 0.2
 """Share of the gap between the feet beyond which a centre of pressure may be of both, and of the frames in which it
 is."""
-
 FootMarkers = Mapping[str, Sequence[str]]
 """Labels of the markers on each foot (heel, toes, ankle), by "r" and "l"."""
+FIRM_LOAD_N = 5 * LOAD_THRESHOLD_N
+"""Vertical force below which a centre of pressure is too noisy to be judged."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,3 +252,39 @@ def bridged(time: FloatArray, loaded: BoolArray) -> BoolArray:
         if within and span_s(time, first - 1, last + 1) < BRIDGED_GAP_S:
             closed[first : last + 1] = True
     return closed
+
+
+def centre_of_pressure(wrench: np.ndarray, height_m: float = 0.0) -> np.ndarray:
+    """Return the point (..., 3) m at this height (0: the ground) at which a wrench (..., 6) has no horizontal moment.
+
+    Without vertical force there is no such point: the point above the origin is returned.
+    """
+    upward = np.where(wrench[..., 1] == 0.0, np.inf, wrench[..., 1])
+    x = (wrench[..., 5] + height_m * wrench[..., 0]) / upward
+    z = (height_m * wrench[..., 2] - wrench[..., 3]) / upward
+    return np.stack([x, np.full_like(x, height_m), z], axis=-1)
+
+
+def free_moment(wrench: np.ndarray) -> np.ndarray:
+    """Return the moment (...) N m about the vertical through the centre of pressure of a wrench (..., 6)."""
+    return (wrench[..., 3:] - np.cross(centre_of_pressure(wrench), wrench[..., :3]))[..., 1]
+
+
+def with_turned_free_moments(loads: FootLoads) -> FootLoads:
+    """Return the loads with the sign of the free moment about the vertical at each centre of pressure reversed."""
+    carried = loads.force[..., 1] >= LOAD_THRESHOLD_N
+    moment = loads.moment.copy()
+    moment[..., 1] -= np.where(carried, 2.0 * free_moment(loads.wrench), 0.0)
+    return replace(loads, moment=moment)
+
+
+def held_centre_of_pressure(wrench: np.ndarray, least_n: float = LOAD_THRESHOLD_N) -> np.ndarray:
+    """Return the centre of pressure (k, 3) m of one foot's load (k, 6); below `least_n` the nearest sample's above it.
+
+    For a foot that is never loaded it is the origin.
+    """
+    firm = np.flatnonzero(wrench[:, 1] >= least_n)
+    if not len(firm):
+        return np.zeros((len(wrench), 3))
+    nearest = firm[np.searchsorted((firm[1:] + firm[:-1]) / 2, np.arange(len(wrench)))]
+    return centre_of_pressure(wrench[nearest])

@@ -15,8 +15,7 @@ import numpy.typing as npt
 
 from kinertia.errors import TrialError
 from kinertia.findings.finding import Finding, finding, with_evidence
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.trial.data import FEET, BoolArray, FloatArray, FootLoads, Markers, Recording, Trial
 from kinertia.trial.ground_contact import FootMarkers, GroundContact, bridged, ground_contact
 from kinertia.trial.sampled_data import TIME_TOLERANCE_S, nearest_samples, runs, span_s, windows, within

@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray, PlateLoads
+from kinertia.trial.ground_contact import FIRM_LOAD_N, centre_of_pressure
 from kinertia.trial.plate_signals import ForceSpike, UnloadedReading
 from kinertia.trial.sampled_data import TIME_TOLERANCE_S, nearest_samples, runs, span_s
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from kinertia.diagnostics.labels.swapped_markers import labels_by_model
-from kinertia.diagnostics.result.marker_errors import TORSO_RAD
+from kinertia.diagnostics.result.residuals import TORSO_RAD
 from kinertia.diagnostics.runner import blocking
 from kinertia.diagnostics.subject.body_data import unobserved_segments
 from kinertia.errors import BlockedError, MarkerSetError, SettingsError, TrialError
@@ -35,8 +35,7 @@ from kinertia.estimation.simultaneous.instruments.priors import (
     ModelUncertainty,
 )
 from kinertia.findings.finding import Finding, finding
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.gait27 import (
     ARM_COORDINATES,
@@ -55,10 +54,10 @@ from kinertia.motion.stance_pose import hidden_landmarks, stance_pose
 from kinertia.motion.workload import one_blas_thread
 from kinertia.settings import Settings
 from kinertia.trial.data import Recording, Trial
-from kinertia.workflow.person import Person
-from kinertia.workflow.person_model import (
+from kinertia.workflow.person import (
     LOWER_BODY_SD_M,
     UPPER_BODY_SD_M,
+    Person,
     PersonModel,
     RotatedTrial,
     with_stated_ranges,

@@ -18,8 +18,7 @@ from kinertia.estimation.prepare.prepared import known as known_value
 from kinertia.estimation.prior import BspPrior, literature_prior, updated, with_symmetry
 from kinertia.findings.display import shown
 from kinertia.findings.finding import Finding, finding
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.subject.body_files import BodyMeasures, BspTable
 from kinertia.model.bsp import PARAMETERS, UNITS, BodySegmentParameters
 from kinertia.model.stadium_body import measures as all_measures

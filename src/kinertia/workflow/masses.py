@@ -21,8 +21,7 @@ from kinertia.estimation.prior import SECOND_MOMENT_SD, BspPrior, inertia_covari
 from kinertia.estimation.simultaneous.calibration_entry import GAIN, CalibrationEntry
 from kinertia.estimation.simultaneous.fit import SimultaneousFit
 from kinertia.findings.finding import Finding, Severity, finding
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Joint, Skeleton
 from kinertia.settings import Attached

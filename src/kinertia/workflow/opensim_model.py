@@ -19,13 +19,12 @@ from kinertia.estimation.simultaneous.instruments.priors import (
     ModelUncertainty,
 )
 from kinertia.findings.finding import Finding, finding
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.model.anatomy import segment_of
 from kinertia.model.bsp import BodySegmentParameters, impossible_segments
 from kinertia.model.imported_model import OsimModel
 from kinertia.model.skeleton import Axis, Skeleton
-from kinertia.workflow.person_model import (
+from kinertia.workflow.person import (
     LOWER_BODY_SD_M,
     UPPER_BODY_SD_M,
     PersonModel,

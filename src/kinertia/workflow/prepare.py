@@ -17,8 +17,7 @@ from kinertia.settings import Attached, Overrule, Settings, Subject
 from kinertia.trial.data import Recording
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.masses import with_doubted_mass
-from kinertia.workflow.person import Person
-from kinertia.workflow.person_model import PersonModel, RotatedTrial, expect_forces, solved_trials, usable_trial
+from kinertia.workflow.person import Person, PersonModel, RotatedTrial, expect_forces, solved_trials, usable_trial
 from kinertia.workflow.screening import Screened, screen
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from kinertia.diagnostics.context import PersonContext, RecordingContext
 from kinertia.diagnostics.evidence.landmarks import feet_to_pelvis_m, landmark_positions
-from kinertia.diagnostics.markers.computed_markers import computed_points
+from kinertia.diagnostics.markers.unmeasured_data import computed_points
 from kinertia.diagnostics.plates.ground_contact import complete_contact
 from kinertia.diagnostics.registry import MOTION_CHECKS, PERSON_CHECKS, STATIC_CHECKS
 from kinertia.diagnostics.runner import (
@@ -28,11 +28,10 @@ from kinertia.diagnostics.runner import (
 from kinertia.errors import BlockedError, KinertiaError, MarkerSetError, SubjectError
 from kinertia.estimation.prepare.prepared import TotalMass
 from kinertia.findings.finding import Finding, Severity, finding
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.lab_plates import rotation_of_line
-from kinertia.model.alignment_device import with_alignment_device
 from kinertia.model.marker_set import WIDTHS, MarkerSet, matches_labels, spellings
+from kinertia.model.static_landmarks import with_alignment_device
 from kinertia.settings import Subject
 from kinertia.trial.data import Recording
 from kinertia.workflow.person import Person

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.markers.frames import frames
 from kinertia.diagnostics.markers.trajectories import trajectories, visible
+from kinertia.diagnostics.markers.unmeasured_data import frames
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import Markers
 from kinertia.trial.plate_assignment import build_trial

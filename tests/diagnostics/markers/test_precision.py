@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from kinertia.diagnostics.evidence.trajectory_faults import without_copied_frames
-from kinertia.diagnostics.markers.frames import frames
 from kinertia.diagnostics.markers.trajectories import precision
+from kinertia.diagnostics.markers.unmeasured_data import frames
 from kinertia.findings.finding import Severity
 from marker_contexts import context_of
 from recordings import RUNS, WALKS, named_here

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from kinertia.diagnostics.labels.swapped_markers import label_swaps
-from kinertia.diagnostics.markers.frames import frames
 from kinertia.diagnostics.markers.trajectories import trajectories
+from kinertia.diagnostics.markers.unmeasured_data import frames
 from kinertia.findings.finding import Severity
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import Markers

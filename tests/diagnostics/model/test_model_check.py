@@ -7,8 +7,8 @@ import upright_model as upright
 from kinertia.diagnostics.model.model_check import check_model
 from kinertia.errors import SubjectError
 from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
-from kinertia.io.opensim.exporter import export_osim
 from kinertia.io.opensim.reader import read_osim
+from kinertia.io.opensim.writer import export_osim
 from kinertia.io.recording import read_recording
 from kinertia.model.anatomy import model_segments
 from kinertia.model.anthropometry import SEGMENTS, literature_bsp

@@ -8,8 +8,8 @@ import pytest
 
 from kinertia.diagnostics.plates.cop_positions import shows_feet_equally
 from kinertia.findings.finding import Severity
-from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import Markers
+from kinertia.trial.ground_contact import centre_of_pressure
 from kinertia.trial.sampled_data import runs
 from loads_and_feet import context_of, doubted, error_of, feet_of, on_one_plate, place_findings
 from recordings import QUICK_WALKS, RUNS, SQUATS, WALKS, slow_beside

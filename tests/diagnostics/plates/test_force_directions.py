@@ -10,7 +10,7 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.body_motion import force_velocities
 from kinertia.diagnostics.plates.force_directions import force_directions, vertical_signs
 from kinertia.findings.finding import finding
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Where
 from kinertia.io.marker_set_file import choose_marker_set
 from loads_and_feet import on_one_plate
 from plate_findings import codes, context_of, found_in, with_force

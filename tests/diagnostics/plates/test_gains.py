@@ -7,7 +7,7 @@ import pytest
 
 from kinertia.diagnostics.evidence.ambiguous_loads import Overhang
 from kinertia.diagnostics.plates.gains import gains
-from kinertia.trial.centre_of_pressure import centre_of_pressure
+from kinertia.trial.ground_contact import centre_of_pressure
 from plate_findings import context_of, with_force
 from recordings import LONG_WALKS, WALKS
 

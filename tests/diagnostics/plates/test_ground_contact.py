@@ -11,8 +11,8 @@ from kinertia.diagnostics.plates.ground_contact import complete_contact, coverag
 from kinertia.findings.finding import Severity
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.model.marker_set import MarkerSet
-from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import Recording
+from kinertia.trial.ground_contact import centre_of_pressure
 from kinertia.trial.sampled_data import within
 from loads_and_feet import context_of, doubted, place_findings
 from people import person

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.diagnostics.plates.free_moments import free_moments
-from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, centre_of_pressure
+from kinertia.trial.ground_contact import FIRM_LOAD_N, centre_of_pressure
 from plate_findings import plates_alone
 from recordings import LONG_WALKS, RUNS, SQUATS, WALKS, named_here
 

@@ -7,8 +7,8 @@ import pytest
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.plates.plate_positions import repeated_plates
-from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import Markers, PlateLoads, Recording
+from kinertia.trial.ground_contact import centre_of_pressure
 from kinertia.trial.trial_input import selected
 from loads_and_feet import error_of, feet_of
 from recordings import SYNTHETIC, here, slow_beside

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.result.marker_errors import corrected_joints, moved_markers, sideways_lean
+from kinertia.diagnostics.result.residuals import corrected_joints, moved_markers, sideways_lean
 from kinertia.estimation.simultaneous.calibration_entry import AXIS, CalibrationEntry
 from kinertia.estimation.simultaneous.markers.marker_noise import MarkerNoise
 from kinertia.synthetic.walk import walking_subject

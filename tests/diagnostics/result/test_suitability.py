@@ -10,8 +10,7 @@ from kinertia.diagnostics.result.corrections import session_contradictions
 from kinertia.diagnostics.result.suitability import basis, filters, informed, suitability
 from kinertia.diagnostics.runner import explained
 from kinertia.findings.finding import Severity, finding
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.settings import Settings
 from results import codes, error
 

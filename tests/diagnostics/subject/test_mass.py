@@ -7,8 +7,8 @@ import pytest
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.ambiguous_loads import Overhang
-from kinertia.diagnostics.evidence.body_centre import owners_of
 from kinertia.diagnostics.evidence.force_mass import force_mass
+from kinertia.diagnostics.evidence.landmarks import owners_of
 from kinertia.diagnostics.runner import explained
 from kinertia.diagnostics.subject.mass import masses_of_trials, stated_mass
 from kinertia.findings.finding import Severity

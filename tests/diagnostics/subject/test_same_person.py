@@ -8,7 +8,7 @@ import pytest
 from kinertia.diagnostics.runner import explained
 from kinertia.diagnostics.subject.same_person import static_and_trials, trials_of_one_person
 from kinertia.findings.finding import Severity, finding
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Where
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.trial.data import Markers
 from people import codes, only_markers, person, with_markers

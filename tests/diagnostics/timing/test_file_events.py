@@ -8,7 +8,7 @@ import pytest
 
 from kinertia.diagnostics.evidence.foot_trajectories import foot_trajectories
 from kinertia.diagnostics.timing.force_timing import file_events
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Where
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.data import FEET, FootLoads, Trial
 from kinertia.trial.file_contents import FileEvent

@@ -18,7 +18,7 @@ from kinertia.estimation.result.mean_cycles import (
     remarks,
 )
 from kinertia.io.norms_file import Norm
-from kinertia.model.coordinate_pairs import opposite_on_left
+from kinertia.model.skeleton import opposite_on_left
 from kinertia.motion.gait_cycle import PERCENT, feet_under_pelvis
 from kinertia.motion.model_outputs import CLINICAL_ANGLES
 

@@ -8,8 +8,8 @@ import pytest
 
 from kinertia.findings.finding import Severity
 from kinertia.io.recording import read_recording
-from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N
+from kinertia.trial.ground_contact import centre_of_pressure
 from lab_files import CORNERS_M, LAB, lab_walk, write_qtm
 from refusals import codes, only, refused
 

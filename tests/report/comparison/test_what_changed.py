@@ -5,8 +5,7 @@ from dataclasses import replace
 import pytest
 
 from kinertia.findings.finding import Severity, finding
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.report.comparison.what_changed import instrument_doubts
 
 

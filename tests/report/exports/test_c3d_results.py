@@ -9,7 +9,7 @@ import pytest
 import kinertia
 from command_line import fitted, run
 from kinertia.errors import FileError
-from kinertia.estimation.result.leg_outputs import outputs_of
+from kinertia.estimation.result.leg_moments import outputs_of
 from kinertia.io.c3d.outputs import frames_of
 from kinertia.motion.joint_moments import joint_wrenches
 from kinertia.motion.smoothing import smooth

@@ -7,8 +7,7 @@ import pytest
 from found import ASSUMED, CORRECTED, FAULT_FREE, FAULTY, FROZEN, IGNORED, RESIDUAL, UNEXPLAINED, UNUSABLE, WAIVED, ZERO
 from kinertia.findings.finding import finding
 from kinertia.findings.overview import Overview
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.report.pages.finding_view import (
     FindingView,
     digest,

@@ -8,7 +8,7 @@ import numpy as np
 
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory
 from kinertia.diagnostics.evidence.plate_contacts import BETWEEN_M, FAR_M, ONE_STEP_S, Feet, PlateContact
-from kinertia.findings.limit import Limit
+from kinertia.findings.quantity import Limit
 from kinertia.model.marker_set import MarkerSet
 from kinertia.motion.kinematics import FEWEST_FRAMES
 from kinertia.trial.data import FEET, BoolArray, FloatArray, Markers, PlateLoads, Trial

@@ -10,10 +10,9 @@ from typing import Self
 
 import numpy as np
 
-from kinertia.diagnostics.evidence.body_centre import body_centre
+from kinertia.diagnostics.evidence.landmarks import body_centre
 from kinertia.diagnostics.evidence.plate_contacts import loads_on
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
+from kinertia.findings.quantity import Limit, Quantity
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.motion.smoothing import SmoothingError, smooth
 from kinertia.trial.data import FloatArray, PlateLoads, Trial

@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from kinertia.diagnostics.evidence.body_centre import bridged_trajectory
+from kinertia.diagnostics.evidence.landmarks import bridged_trajectory
 from kinertia.trial.data import FEET, BoolArray, FloatArray, FootLoads, Markers
 from kinertia.trial.file_contents import Belt
 from kinertia.trial.ground_contact import bridged

@@ -1,7 +1,7 @@
 """Weighs a body by forces, before inverse kinematics: on the move, standing, and on each plate.
 
 Over a window the mean vertical force is m (g + dv / T), where dv is the change of the body centre's upward velocity
-from kinertia.findings.limit import Limit
+from kinertia.findings.quantity import Limit
 from its beginning to its end. The body's centre is marker-based: each segment has its usual share of body mass. No
 model is fitted; the centre's velocity is wrong by about 0.1 m/s, and by less where the body moves at the end as at the
 beginning: over whole strides and steps, and in standing.
@@ -14,15 +14,14 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.diagnostics.evidence.ambiguous_loads import OVERHANG_M, beyond_edges
-from kinertia.diagnostics.evidence.body_centre import body_centre
 from kinertia.diagnostics.evidence.foot_trajectories import periods
-from kinertia.findings.limit import Limit
+from kinertia.diagnostics.evidence.landmarks import body_centre
+from kinertia.findings.quantity import Limit
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.motion.smoothing import MIN_SAMPLES, SmoothingError, smooth
-from kinertia.trial.centre_of_pressure import FIRM_LOAD_N
 from kinertia.trial.data import FEET, FloatArray, FootLoads, Markers, PlateLoads, Trial
 from kinertia.trial.foot_motion import AROUND_LOAD_S
-from kinertia.trial.ground_contact import FootMarkers
+from kinertia.trial.ground_contact import FIRM_LOAD_N, FootMarkers
 from kinertia.trial.sampled_data import TIME_TOLERANCE_S, nearest_samples, runs, span_s, within
 
 CHANGE_SD_M_S = {"standing": 0.01, "whole strides": 0.05, "steps": 0.05, "the whole window": 0.14}

@@ -1,10 +1,12 @@
-"""Locates landmarks and the heading of feet and pelvis from the markers alone, big toes without a marker included."""
+"""Locates landmarks, the heading of feet and pelvis, and the body's centre from the markers alone."""
 
 from collections.abc import Mapping
 
 import numpy as np
 
+from kinertia.model.anatomy import segment_of
 from kinertia.model.marker_set import MarkerSet
+from kinertia.model.skeleton import Skeleton
 from kinertia.trial.data import FEET, FloatArray, Markers
 
 CLEAR = 0.5
@@ -17,6 +19,9 @@ _AHEAD_OF_HEIGHT, _MEDIAL_OF_HEIGHT = 0.132, 0.035
 the marker on the big toe is 0.126 to 0.139 ahead and 0.032 to 0.041 across."""
 _AHEAD_OF_METATARSAL, _MEDIAL_OF_METATARSAL = 1.15, 0.3
 """Shares of the distance from heel to metatarsal head, used where stature is unknown."""
+_SHARES = {"pelvis": 14.2, "torso": 40.0, "thigh": 12.3, "shank": 4.8, "foot": 1.2, "upper_arm": 2.4, "forearm": 2.3}
+"""Per cent of the body's mass, head with torso, hand with forearm (Dumas 2007, men)."""
+_SEEN = 0.8
 
 
 def landmark_positions(markers: Markers, marker_set: MarkerSet) -> dict[str, FloatArray]:
@@ -109,3 +114,42 @@ def halluces(landmarks: Mapping[str, FloatArray], height_m: float | None) -> dic
         medial = to_left if side == "r" else -to_left
         found[side] = front + along * max(ahead - usual, 0.0) + medial * across
     return found
+
+
+def owners_of(skeleton: Skeleton) -> dict[str, str]:
+    """Return the segment of the anthropometric tables that each marker of a model is on; empty where unknown."""
+    return {marker.label: segment_of(marker.segment) or "" for marker in skeleton.markers}
+
+
+def body_centre(owners: Mapping[str, str], markers: Markers) -> FloatArray | None:
+    """Compute the marker-based centre of mass (n, 3) m, each segment weighted by its share of body mass; None without a
+    pelvis.
+
+    Args:
+        owners: the segment that each marker is on; markers on anything else (a backpack) do not count.
+        markers: Y up.
+    """
+    seen = markers.seen
+    places: dict[str, list[FloatArray]] = {}
+    for column, label in enumerate(markers.labels):
+        owner = owners.get(label, "")
+        if _share(owner) and seen[:, column].mean() >= _SEEN:
+            places.setdefault(owner, []).append(bridged_trajectory(markers.time, markers.positions[:, column]))
+    if not places.keys() & {"pelvis", "torso"}:
+        return None
+    shares = {name: _share(name) for name in places}
+    middles = (shares[name] * np.mean(own, axis=0) for name, own in places.items())
+    total: FloatArray = sum(middles, np.zeros((len(seen), 3)))
+    return total / sum(shares.values())
+
+
+def _share(segment: str) -> float:
+    return _SHARES.get(segment.removesuffix("_r").removesuffix("_l"), 0.0)
+
+
+def bridged_trajectory(time: FloatArray, trajectory: FloatArray) -> FloatArray:
+    """Return a trajectory (n, k) with unknown values bridged by straight lines."""
+    known = np.isfinite(trajectory).all(axis=1)
+    if known.all():
+        return trajectory
+    return np.stack([np.interp(time, time[known], along[known]) for along in trajectory.T], axis=1)

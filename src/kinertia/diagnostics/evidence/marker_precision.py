@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from kinertia.findings.limit import Limit
+from kinertia.findings.quantity import Limit
 from kinertia.trial.data import FloatArray, Markers
 
 COARSE_M = Limit(0.0015, "m", usual=(0.0, 8e-5))

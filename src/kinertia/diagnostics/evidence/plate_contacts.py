@@ -13,11 +13,10 @@ import numpy as np
 
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory
 from kinertia.findings.finding import Finding
-from kinertia.findings.limit import Limit
-from kinertia.trial.centre_of_pressure import centre_of_pressure
+from kinertia.findings.quantity import Limit
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
 from kinertia.trial.foot_motion import AROUND_LOAD_S
-from kinertia.trial.ground_contact import bridged
+from kinertia.trial.ground_contact import bridged, centre_of_pressure
 from kinertia.trial.sampled_data import TIME_TOLERANCE_S, runs, span_s
 
 COP_MIN_FORCE_N = 5 * LOAD_THRESHOLD_N

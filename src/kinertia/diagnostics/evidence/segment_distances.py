@@ -13,9 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinertia.findings.finding import Finding, finding
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import FloatArray, Markers
 

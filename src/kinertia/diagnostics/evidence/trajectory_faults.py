@@ -14,7 +14,7 @@ from typing import Self
 import numpy as np
 
 from kinertia.diagnostics.evidence.marker_precision import USUAL_HZ
-from kinertia.findings.limit import Limit
+from kinertia.findings.quantity import Limit
 from kinertia.trial.data import BoolArray, FloatArray, Markers
 from kinertia.trial.sampled_data import runs
 

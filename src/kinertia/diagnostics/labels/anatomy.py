@@ -15,8 +15,7 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.landmarks import CLEAR, cosine, horizontal, most_forwards, unit
 from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
+from kinertia.findings.quantity import Limit, Quantity
 from kinertia.model.marker_set import MarkerSet, in_words
 from kinertia.trial.data import FloatArray
 

@@ -7,8 +7,7 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.runner import check
 from kinertia.errors import KinertiaError, MarkerSetError
 from kinertia.findings.finding import Finding, Severity, finding
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
+from kinertia.findings.quantity import Limit, Quantity
 from kinertia.io.marker_set_file import nearest_preset
 from kinertia.model.gait27 import build_gait27
 from kinertia.model.joint_centres import (

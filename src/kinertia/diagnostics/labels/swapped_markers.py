@@ -23,9 +23,7 @@ from kinertia.diagnostics.evidence.trajectory_faults import step_limit_m, steps
 from kinertia.diagnostics.runner import check
 from kinertia.estimation.prepare.calibration import sampled
 from kinertia.findings.finding import Finding, finding, with_evidence
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.model.gait27 import ARM_ROTATIONS, ELBOWS
 from kinertia.model.marker_set import MarkerSet, in_words
 from kinertia.model.skeleton import Skeleton

@@ -14,8 +14,7 @@ from kinertia.diagnostics.evidence.landmarks import feet_to_pelvis_m
 from kinertia.diagnostics.plates.plate_positions import heights_on_plates
 from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
+from kinertia.findings.quantity import Limit, Quantity
 from kinertia.trial.data import FloatArray
 from kinertia.trial.marker_quality import UPRIGHT_SHARE, extent_m
 from kinertia.trial.sampled_data import runs, span_s

@@ -13,7 +13,7 @@ import numpy as np
 
 from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import PersonContext, RecordingContext
-from kinertia.diagnostics.evidence.body_centre import bridged_trajectory
+from kinertia.diagnostics.evidence.landmarks import bridged_trajectory
 from kinertia.diagnostics.evidence.marker_precision import COARSE_M, NOISY_M
 from kinertia.diagnostics.evidence.trajectory_faults import (
     BRIEF_S,
@@ -28,9 +28,7 @@ from kinertia.diagnostics.evidence.trajectory_faults import (
 )
 from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, Severity, finding
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.model.marker_set import in_words
 from kinertia.motion.kinematics import LONGEST_BRIDGE_S
 from kinertia.trial.data import Markers

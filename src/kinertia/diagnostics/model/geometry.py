@@ -17,9 +17,7 @@ import numpy as np
 from kinertia.diagnostics.context import PersonContext
 from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, finding, with_evidence
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.model.bsp import BodySegmentParameters, FloatArray
 from kinertia.model.neutral_joints import NeutralJoints, angle_deg, mirrored, neutral_joints
 from kinertia.model.skeleton import Skeleton

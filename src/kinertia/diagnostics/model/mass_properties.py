@@ -21,9 +21,7 @@ from kinertia.diagnostics.runner import check
 from kinertia.diagnostics.subject.mass import ERROR_SHARE, WARNING_SHARE
 from kinertia.estimation.prepare.prepared import estimated_bodies
 from kinertia.findings.finding import Finding, Severity, finding
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.model.anatomy import segment_of
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters, FloatArray, impossible_segments, second_moments
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.estimation.prior import literature_prior
-from kinertia.findings.limit import Limit
+from kinertia.findings.quantity import Limit
 from kinertia.model.anatomy import ModelSegments, model_segments
 from kinertia.model.anthropometry import BodyGeometry, check_subject, literature_bsp
 from kinertia.model.bsp import BodySegmentParameters

@@ -18,9 +18,7 @@ from kinertia.diagnostics.context import PersonContext
 from kinertia.diagnostics.evidence.segment_distances import FEWEST_PAIRS, LOWER_BODY, SegmentDistances, swapped_labels
 from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, Severity, finding
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.model.anatomy import segment_of
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Skeleton

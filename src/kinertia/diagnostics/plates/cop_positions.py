@@ -44,8 +44,7 @@ from kinertia.diagnostics.timing.contact_delays import (
     stance_durations,
 )
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
+from kinertia.findings.quantity import Limit, Quantity
 from kinertia.findings.rule import rule
 from kinertia.trial.data import FloatArray, PlateLoads
 

@@ -28,11 +28,10 @@ from kinertia.diagnostics.evidence.body_motion import (
 from kinertia.diagnostics.evidence.force_mass import loaded_wrenches
 from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, finding, with_evidence
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
+from kinertia.findings.quantity import Limit, Quantity
 from kinertia.findings.rule import rule
-from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, free_moment
 from kinertia.trial.data import LOAD_THRESHOLD_N, PlateLoads, Trial
+from kinertia.trial.ground_contact import FIRM_LOAD_N, free_moment
 from kinertia.trial.sampled_data import rms, span_s
 
 _OPPOSED = Limit(-0.4, usual=(0.5, 1.0))

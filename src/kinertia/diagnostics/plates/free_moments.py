@@ -25,12 +25,11 @@ from kinertia.diagnostics.evidence.foot_trajectories import periods
 from kinertia.diagnostics.evidence.force_mass import carrying, loaded_wrenches
 from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, finding
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
+from kinertia.findings.quantity import Limit, Quantity
 from kinertia.findings.rule import rule
-from kinertia.trial.centre_of_pressure import centre_of_pressure, free_moment
 from kinertia.trial.data import FloatArray, FootLoads, PlateLoads
 from kinertia.trial.file_contents import TorqueColumns
+from kinertia.trial.ground_contact import centre_of_pressure, free_moment
 from kinertia.trial.sampled_data import TIME_TOLERANCE_S, rms, span_s, within
 
 _ABSENT_NM = Limit(0.005, "N m")

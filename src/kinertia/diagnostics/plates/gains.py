@@ -22,8 +22,7 @@ from kinertia.diagnostics.evidence.body_motion import (
 )
 from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, with_evidence
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
+from kinertia.findings.quantity import Limit, Quantity
 from kinertia.trial.data import PlateLoads
 from kinertia.trial.sampled_data import span_s, within
 

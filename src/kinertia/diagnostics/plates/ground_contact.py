@@ -19,9 +19,7 @@ from kinertia.diagnostics.runner import check
 from kinertia.diagnostics.subject.movements import task_of
 from kinertia.errors import KinertiaError
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.motion.common_cutoff import LOWEST_HZ
 from kinertia.motion.kinematics import END_PERIODS, FEWEST_FRAMES, legs_on_plates
 from kinertia.trial.data import FEET, BoolArray, FloatArray, Recording

@@ -26,8 +26,7 @@ from kinertia.diagnostics.evidence.plate_contacts import (
 )
 from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, finding
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
+from kinertia.findings.quantity import Limit, Quantity
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
 from kinertia.trial.sampled_data import rms
 

@@ -17,12 +17,10 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.force_mass import ADULT_KG, STEP_N, carrying, loaded_wrenches, wrenches
 from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, Severity, finding
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
-from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, centre_of_pressure
+from kinertia.findings.quantity import Limit, Quantity, Where
+from kinertia.motion.ground_reactions import load_bandwidth_hz
 from kinertia.trial.data import BoolArray, FloatArray, PlateLoads
-from kinertia.trial.load_bandwidth import load_bandwidth_hz
+from kinertia.trial.ground_contact import FIRM_LOAD_N, centre_of_pressure
 from kinertia.trial.plate_signals import LIMITS_N, LONGEST_S
 from kinertia.trial.sampled_data import runs, span_s
 

@@ -16,12 +16,11 @@ from kinertia.diagnostics.evidence.body_motion import CLEARLY_BEST, HORIZONTAL, 
 from kinertia.diagnostics.evidence.force_mass import ADULT_KG, STEP_N
 from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
+from kinertia.findings.quantity import Limit, Quantity
 from kinertia.findings.rule import rule
 from kinertia.model.skeleton import GRAVITY_M_S2
-from kinertia.trial.centre_of_pressure import FIRM_LOAD_N
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
+from kinertia.trial.ground_contact import FIRM_LOAD_N
 from kinertia.trial.plate_signals import ZEROED_N, ZEROED_NM, UnloadedReading
 from kinertia.trial.sampled_data import span_s, within
 

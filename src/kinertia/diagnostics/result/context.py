@@ -4,13 +4,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from kinertia.diagnostics.evidence.body_centre import owners_of
 from kinertia.diagnostics.evidence.force_mass import ForceMass, force_mass
+from kinertia.diagnostics.evidence.landmarks import owners_of
 from kinertia.diagnostics.marker_context import Axes
 from kinertia.estimation.prepare.prepared import Prepared
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Where
 from kinertia.motion.kinematics import Kinematics
 from kinertia.trial.marker_quality import travel
 

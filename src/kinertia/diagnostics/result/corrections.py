@@ -14,9 +14,7 @@ from kinertia.diagnostics.runner import check
 from kinertia.estimation.simultaneous.calibration_entry import DELAY, NOTABLE, ZERO, CalibrationEntry
 from kinertia.estimation.simultaneous.instruments.priors import DELAY_PRIOR_S, TRIAL_DELAY_PRIOR_S, ZERO_PRIOR_N
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.model.skeleton import GRAVITY_M_S2
 
 _FEWEST = 2

@@ -48,9 +48,7 @@ from kinertia.estimation.simultaneous.instruments.priors import (
 )
 from kinertia.estimation.simultaneous.uncertainty.evidence import SURE
 from kinertia.findings.finding import Finding, finding, with_evidence
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Limit, Quantity, Where
 
 _POSITION_SD_M, _ROTATION_SD_RAD = (
     float(np.hypot(PLATE_PRIOR[name].sd, FLOOR_PRIOR[name].sd)) for name in ("x", "turn")

@@ -2,7 +2,6 @@
 
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.corrections import delays, zero_offsets
-from kinertia.diagnostics.result.marker_errors import corrected_joints, moved_markers, sideways_lean
 from kinertia.diagnostics.result.plate_errors import (
     common_offset,
     free_moments,
@@ -11,7 +10,13 @@ from kinertia.diagnostics.result.plate_errors import (
     plate_positions,
     plate_rotation,
 )
-from kinertia.diagnostics.result.residuals import joint_angles, residuals
+from kinertia.diagnostics.result.residuals import (
+    corrected_joints,
+    joint_angles,
+    moved_markers,
+    residuals,
+    sideways_lean,
+)
 from kinertia.diagnostics.result.soundness import attached_items, forces_of_the_motion, soundness, total_mass
 from kinertia.diagnostics.result.suitability import basis, filters
 from kinertia.diagnostics.runner import Check, asked

@@ -17,9 +17,7 @@ from kinertia.estimation.identifiability import INFORMED, MEASURED
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.leg_moments import coverage_sentence, forces_used
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.trial.sampled_data import rms, rms_length
 
 Use = Literal["use", "use with care", "do not use"]

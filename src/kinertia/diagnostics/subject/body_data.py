@@ -19,9 +19,7 @@ from kinertia.diagnostics.subject.mass import weighed_as_stated
 from kinertia.estimation.prior import population_of
 from kinertia.findings.display import first_few
 from kinertia.findings.finding import Finding, Severity, finding
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.model.gait27 import ARM_COORDINATES, VIRTUAL_TRUNK
 from kinertia.model.joint_centres import find_landmarks
 from kinertia.model.marker_set import in_words

@@ -19,9 +19,7 @@ from kinertia.diagnostics.evidence.force_mass import MISSING, MOSTLY, UNMEASURED
 from kinertia.diagnostics.runner import check
 from kinertia.estimation.prepare.prepared import TotalMass
 from kinertia.findings.finding import Finding, Severity, finding
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.trial.data import PlateLoads
 

@@ -14,8 +14,7 @@ from kinertia.diagnostics.context import PersonContext, RecordingContext
 from kinertia.diagnostics.runner import check
 from kinertia.estimation.simultaneous.instruments.priors import JOINT_CENTRE_SD_M, WITHOUT_STATIC
 from kinertia.findings.finding import Finding, finding
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
+from kinertia.findings.quantity import Limit, Quantity
 from kinertia.motion.stance_pose import hidden_landmarks
 from kinertia.trial.data import BoolArray, Markers
 from kinertia.trial.marker_quality import LEAST_WALK_M, STANDING_RANGE_M, still_span_s

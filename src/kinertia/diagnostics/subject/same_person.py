@@ -23,9 +23,7 @@ from kinertia.diagnostics.evidence.segment_distances import (
 from kinertia.diagnostics.runner import check
 from kinertia.diagnostics.subject.same_session import AGAINST_STANDING, ERRORS, FAR_M, OTHER_SCALE, camera_scale
 from kinertia.findings.finding import Finding, finding
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import Recording
 from kinertia.trial.sampled_data import rms

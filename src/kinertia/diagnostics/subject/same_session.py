@@ -31,9 +31,7 @@ from kinertia.diagnostics.evidence.body_motion import (
 from kinertia.diagnostics.evidence.segment_distances import FEWEST_PAIRS, SAME_SESSION_M, SegmentDistances
 from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, finding
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.trial.sampled_data import rms, span_s
 
 AGAINST_STANDING = Limit(-0.0045)

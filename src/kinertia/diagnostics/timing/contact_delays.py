@@ -26,8 +26,7 @@ from kinertia.diagnostics.evidence.plate_contacts import (
     loads_on,
 )
 from kinertia.findings.finding import finding, with_evidence
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
+from kinertia.findings.quantity import Limit, Quantity
 from kinertia.trial.data import FloatArray, PlateLoads
 
 DELAY_S, LONGEST_DELAY_S = Limit(0.045, "s", usual=(-0.025, 0.025)), Limit(0.25, "s")

@@ -33,12 +33,10 @@ from kinertia.diagnostics.evidence.body_motion import (
 from kinertia.diagnostics.evidence.foot_trajectories import LEAST_BELT_M_S, standing_speeds
 from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
-from kinertia.trial.centre_of_pressure import FIRM_LOAD_N
+from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.trial.data import FEET, FloatArray, Trial
 from kinertia.trial.file_contents import GaitEvent
+from kinertia.trial.ground_contact import FIRM_LOAD_N
 from kinertia.trial.plate_assignment import FOOT_NAMES
 from kinertia.trial.sampled_data import span_s
 from kinertia.trial.stances import (

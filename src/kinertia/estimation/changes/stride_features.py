@@ -16,7 +16,7 @@ from kinertia.estimation.result.drawn_fit import drawn_fit, kept_draws
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import PosteriorDraws
-from kinertia.model.coordinate_pairs import by_side
+from kinertia.model.skeleton import by_side
 from kinertia.motion.gait_cycle import PERCENT, Stride
 from kinertia.motion.joint_moments import component_names, joint_and_side
 

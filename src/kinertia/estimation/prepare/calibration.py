@@ -18,8 +18,7 @@ import numpy as np
 
 from kinertia.errors import TrialError
 from kinertia.estimation.simultaneous.terms.motion_terms import RangeTerms
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.model.coordinate_range import Bounds
 from kinertia.model.skeleton import Marker, Skeleton
 from kinertia.motion.inverse_kinematics import InverseKinematics, solve_ik

@@ -24,8 +24,8 @@ from kinertia.estimation.prepare.calibration import first_poses
 from kinertia.model.gait27 import ARM_ROTATIONS, ELBOWS, ENOUGH_TRUNK_MARKERS, KNEES, UPPER_ARM_ROTATIONS, VIRTUAL_TRUNK
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.inverse_kinematics import InverseKinematics
-from kinertia.motion.moving_windows import gaussian_mean
 from kinertia.trial.data import FloatArray, Markers, Trial
+from kinertia.trial.sampled_data import gaussian_mean
 
 BACKWARDS_RAD = 0.05
 """Least angle beyond the end of the elbow's range, median over the frames."""

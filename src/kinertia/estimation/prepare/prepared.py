@@ -10,9 +10,7 @@ from kinertia.errors import PriorError, SettingsError, SubjectError, TrialError,
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.instruments.priors import ModelUncertainty
 from kinertia.findings.finding import Finding, finding, with_evidence
-from kinertia.findings.limit import Limit
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.io.file_names import trouble_as_folders
 from kinertia.model.anthropometry import check_subject
 from kinertia.model.bsp import BodySegmentParameters

@@ -16,8 +16,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from kinertia.estimation.result.curve_source import CurveSource, Estimated, Stage, tracked
-from kinertia.model.coordinate_pairs import by_side
-from kinertia.model.skeleton import GRAVITY_M_S2
+from kinertia.model.skeleton import GRAVITY_M_S2, by_side
 from kinertia.motion.gait_cycle import PERCENT, FeetUnderPelvis, Stride, feet_under_pelvis
 from kinertia.motion.joint_moments import component_names, joint_and_side
 from kinertia.motion.model_outputs import clinical_angles

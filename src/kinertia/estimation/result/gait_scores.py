@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kinertia.io.norms_file import Norm
-from kinertia.model.coordinate_pairs import opposite_on_left
-from kinertia.model.skeleton import Skeleton
+from kinertia.model.skeleton import Skeleton, opposite_on_left
 from kinertia.motion.gait_cycle import PERCENT
 from kinertia.motion.model_outputs import CLINICAL_ANGLES
 

@@ -25,7 +25,7 @@ from kinertia.estimation.result.cycles import cycle_curves, spatiotemporal_colum
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.gait_scores import GaitProfile, rms_deg, variable_score
 from kinertia.io.norms_file import Norm
-from kinertia.model.coordinate_pairs import by_side, opposite_on_left
+from kinertia.model.skeleton import by_side, opposite_on_left
 from kinertia.motion.gait_cycle import PERCENT
 from kinertia.motion.model_outputs import CLINICAL_ANGLES
 from kinertia.trial.data import FEET

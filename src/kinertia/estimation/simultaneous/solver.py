@@ -26,12 +26,11 @@ from kinertia.estimation.simultaneous.linear_algebra.normal_equations import Sta
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.observation import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.outcome import Ended, SimultaneousResult, result_of
-from kinertia.estimation.simultaneous.search.delay_profile import CostProfile, with_left_out
 from kinertia.estimation.simultaneous.search.gauss_newton import AdaptedPrior, GaussNewton, MotionAlone, SecantPairs
 from kinertia.estimation.simultaneous.search.problem import Linearised, MapProblem, Point, Slope
 from kinertia.estimation.simultaneous.terms.all_terms import TERMS
-from kinertia.estimation.simultaneous.terms.calibration_terms import as_displaced
 from kinertia.estimation.simultaneous.terms.cost_term import CostTerm
+from kinertia.estimation.simultaneous.terms.model_terms import as_displaced
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations, curve_deviations
 from kinertia.estimation.simultaneous.uncertainty.evidence import (
     Evidence,
@@ -39,8 +38,13 @@ from kinertia.estimation.simultaneous.uncertainty.evidence import (
     missing_loads,
     suspected_plates,
 )
-from kinertia.estimation.simultaneous.uncertainty.knot_phases import OfPhases, followed
-from kinertia.estimation.simultaneous.uncertainty.motion_noise import motion_noise
+from kinertia.estimation.simultaneous.uncertainty.marginal_posterior import (
+    CostProfile,
+    OfPhases,
+    followed,
+    with_left_out,
+)
+from kinertia.estimation.simultaneous.uncertainty.model_errors import motion_noise
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import (
     Mode,
     PosteriorDraws,

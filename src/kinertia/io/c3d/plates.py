@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from kinertia.findings.finding import Finding, with_evidence
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.c3d.ezc3d_library import parameter_values
 from kinertia.io.lab_plates import LabPlates, plate_left_out
 from kinertia.io.text.trc import METRES_PER_UNIT

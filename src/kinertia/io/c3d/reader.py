@@ -17,8 +17,7 @@ import numpy as np
 from kinertia.errors import FileError
 from kinertia.findings.display import first_few
 from kinertia.findings.finding import Finding, finding, with_evidence
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.c3d.events import file_events
 from kinertia.io.c3d.ezc3d_library import (
     C3dContent,

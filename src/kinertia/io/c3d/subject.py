@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 
 from kinertia.findings.finding import Finding, finding
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.c3d.ezc3d_library import parameter_values
 from kinertia.model.marker_set import folded
 

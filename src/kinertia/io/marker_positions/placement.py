@@ -16,7 +16,7 @@ from kinertia.io.marker_positions.landmark_search import (
     wands,
 )
 from kinertia.io.marker_positions.standing_body import WHERE, StandingBody, body_axes
-from kinertia.model.alignment_device import device_labels
+from kinertia.model.static_landmarks import device_labels
 from kinertia.trial.data import FloatArray, Markers, Recording
 from kinertia.trial.marker_quality import STILL_M_S, speed_m_s
 

@@ -14,8 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from kinertia.errors import OsimError
 from kinertia.findings.finding import with_evidence
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.opensim.xml import Element
 from kinertia.model.coordinate_map import (
     AxisFunction,

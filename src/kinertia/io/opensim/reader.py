@@ -1,6 +1,6 @@
 """Reads OpenSim model files (.osim, formats 3 and 4): bodies, joints, coordinates, markers as a `Skeleton`.
 
-Muscles, wrapping, geometry and controllers are not read; `kinertia.io.opensim.editor` passes them through unchanged. An
+Muscles, wrapping, geometry and controllers are not read; `kinertia.io.opensim.writer` passes them through unchanged. An
 element that cannot be represented raises an error that identifies it.
 """
 
@@ -12,8 +12,7 @@ import numpy as np
 
 from kinertia.errors import OsimError
 from kinertia.findings.finding import with_evidence
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.opensim.joints import Frames, JointElement, Values, coupled, read_joint, read_joint_in_body
 from kinertia.io.opensim.xml import Element, XmlError, parse
 from kinertia.io.text.number_table import expect_file

@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from kinertia.errors import FileError
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.text.csv_file import has_columns, read_csv
 from kinertia.model.bsp import PARAMETERS, UNITS
 from kinertia.model.stadium_body import Measure, measures

@@ -11,8 +11,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
 from kinertia.findings.finding import Severity, with_evidence
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.file_names import missing_file, path_from
 from kinertia.io.marker_set_file import preset_names
 from kinertia.io.text.toml_lines import quoted

@@ -13,8 +13,7 @@ import numpy as np
 
 from kinertia.errors import FileError
 from kinertia.findings.finding import Finding, with_evidence
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.lab_plates import LabPlates, to_ground_plates
 from kinertia.io.text.number_table import mismatch, read_lines, read_rows, uneven
 from kinertia.io.text.sto import header_entry, other_count

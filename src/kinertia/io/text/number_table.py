@@ -15,11 +15,10 @@ import numpy as np
 
 from kinertia.errors import FileError
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.file_names import missing_file
 from kinertia.trial.data import BoolArray, FloatArray
-from kinertia.trial.impossible_data import step_evidence
+from kinertia.trial.sampled_data import step_evidence
 
 _MOST_DECIMALS = 7
 _COARSEST_S = 0.01

@@ -15,8 +15,7 @@ import numpy as np
 
 from kinertia.errors import FileError
 from kinertia.findings.finding import Finding
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.lab_plates import (
     LabPlates,
     PlateMoments,

@@ -22,7 +22,7 @@ from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.leg_moments import forces_before, forces_used, moment_coverage
 from kinertia.estimation.result.trial_fit import JointCurves, TrialFit
 from kinertia.findings.finding import Severity
-from kinertia.io.opensim.exporter import export_osim
+from kinertia.io.opensim.writer import export_osim
 from kinertia.io.results.output_folder import complete_folder, expect_own_folder
 from kinertia.io.subject.provenance import Provenance
 from kinertia.io.text.csv_file import inert
@@ -130,7 +130,7 @@ def write_model(fit: Fit, folder: Path) -> None:
     if fit.file is None:
         export_osim(folder / "model.osim", fit.skeleton, fit.estimate)
         return
-    from kinertia.io.opensim.editor import write_osim
+    from kinertia.io.opensim.writer import write_osim
 
     positions = {marker.label: marker.position for marker in fit.skeleton.markers}
     shifts = centre_offsets(fit.skeleton)

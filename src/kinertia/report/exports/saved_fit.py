@@ -17,8 +17,7 @@ from kinertia.estimation.simultaneous.uncertainty.evidence import FreeMomentSign
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import PosteriorDraws, TrialDraws
 from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import OneSided, Unlikeness
 from kinertia.findings.finding import Finding
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.results.object_archive import read_archive, write_archive
 from kinertia.io.subject.provenance import Provenance
 from kinertia.io.versions import VERSION, versions

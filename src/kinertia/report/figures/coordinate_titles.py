@@ -13,8 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kinertia.estimation.result.fit import Fit
-from kinertia.model.coordinate_pairs import by_side
-from kinertia.model.skeleton import Skeleton
+from kinertia.model.skeleton import Skeleton, by_side
 from kinertia.motion.model_outputs import CLINICAL_ANGLES
 from kinertia.settings import SignConvention
 from kinertia.trial.data import FEET

@@ -17,8 +17,7 @@ from kinertia.estimation.result.cycles import FORCES, UNITS, CycleCurve, Kind, c
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.mean_cycles import common_strides, main_task, mean_of, mean_of_common
 from kinertia.io.norms_file import Norm
-from kinertia.model.coordinate_pairs import by_side, opposite_on_left
-from kinertia.model.skeleton import Skeleton
+from kinertia.model.skeleton import Skeleton, by_side, opposite_on_left
 from kinertia.motion.gait_cycle import PERCENT, Phase
 from kinertia.motion.joint_moments import body_joints, component_names, joint_and_side
 from kinertia.motion.model_outputs import CLINICAL_ANGLES

@@ -20,8 +20,8 @@ from kinertia.motion.kinematics import Kinematics
 from kinertia.report.figures import style
 from kinertia.report.figures.bsp_figures import segment_name
 from kinertia.report.figures.figure import Figure, base_layout, compact, plain
-from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N
+from kinertia.trial.ground_contact import centre_of_pressure
 
 _PLOTLY_FRAMES = 60
 """Plotly redraws the whole scene for every frame."""

@@ -18,8 +18,8 @@ from kinertia.report.figures.skeleton_view import view
 from kinertia.report.pages.finding_view import FindingView
 from kinertia.report.pages.page import MOST_TRIALS, VIEW_FRAMES
 from kinertia.report.pages.rendering import rendered
-from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N, Markers, PlateLoads
+from kinertia.trial.ground_contact import FIRM_LOAD_N, centre_of_pressure
 from kinertia.trial.sampled_data import nearest_samples
 from kinertia.workflow.check import ModelOverview, RecordingCheck
 

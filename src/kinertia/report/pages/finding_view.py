@@ -24,9 +24,8 @@ from kinertia.findings.overview import (
     in_order,
     reported,
 )
-from kinertia.findings.quantity import Quantity
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.findings.rule import Rule, matching, rule
-from kinertia.findings.where import Where
 
 LOOKS = {USE: "info", WITH_CARE: "warning", DO_NOT_USE: "error"}
 """Class of the style sheet for each word of a verdict; that of a finding is its severity."""

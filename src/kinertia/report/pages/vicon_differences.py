@@ -17,7 +17,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kinertia.estimation.result.fit import Fit
-from kinertia.estimation.result.leg_outputs import outputs_of
+from kinertia.estimation.result.leg_moments import outputs_of
 from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.estimation.simultaneous.calibration_entry import DELAY, GAIN
 from kinertia.motion.ground_reactions import measured_reactions

@@ -12,7 +12,7 @@ from kinertia.estimation.simultaneous.instruments.priors import (
     PLATE_PRIOR,
 )
 from kinertia.synthetic.walk import walking_subject
-from kinertia.trial.centre_of_pressure import centre_of_pressure
+from kinertia.trial.ground_contact import centre_of_pressure
 from kinertia.trial.sampled_data import runs
 from results import entry_of, of_estimate
 from short_walk_fit import estimated, fitted, seen

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, FaultMixture, GaussianPrior
-from kinertia.estimation.simultaneous.search.delay_profile import CostProfile, with_left_out
+from kinertia.estimation.simultaneous.uncertainty.marginal_posterior import CostProfile, with_left_out
 
 CLOCK, OWN = FaultMixture(0.0003, 0.008, 0.3), FaultMixture(0.00003, 0.01, 0.05)
 

@@ -7,8 +7,8 @@ from kinertia.estimation.simultaneous.calibration_entry import BENDING
 from kinertia.estimation.simultaneous.inputs import BSP, PLACES, SKIN, STILL
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.search.problem import MapProblem, Point
-from kinertia.estimation.simultaneous.terms.bsp_term import LEAST_INFORMATION
 from kinertia.estimation.simultaneous.terms.instrument_term import CLOCK, GAINS, PLATES, TRIAL_DELAYS, ZEROS
+from kinertia.estimation.simultaneous.terms.model_terms import LEAST_INFORMATION
 from kinertia.model.log_cholesky import nearest_consistent
 from small_problem import curved_problem, point, residuals, small_problem
 from validation.study_bound import dense_band

@@ -13,7 +13,7 @@ from kinertia.estimation.simultaneous.search.problem import MapProblem, Point
 from kinertia.estimation.simultaneous.solver import _roots_in_trials, _uncertainty
 from kinertia.estimation.simultaneous.terms.instrument_term import CLOCK, PLATES, ZEROS
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import curve_deviations
-from kinertia.estimation.simultaneous.uncertainty.knot_phases import OfPhases
+from kinertia.estimation.simultaneous.uncertainty.marginal_posterior import OfPhases
 from kinertia.estimation.simultaneous.uncertainty.model_errors import block_growth, knee_geometry
 from kinertia.estimation.simultaneous.uncertainty.moment_derivatives import MomentsOfTrial
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import Mode

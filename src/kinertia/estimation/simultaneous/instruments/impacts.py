@@ -15,8 +15,7 @@ that accelerates the body.
 import numpy as np
 from scipy.interpolate import make_lsq_spline
 
-from kinertia.motion.moving_windows import even_mean, greatest
-from kinertia.trial.sampled_data import runs
+from kinertia.trial.sampled_data import even_mean, greatest, runs
 
 _BESIDE = 2.0
 """Ratio of the difference between a soft body and rigid segments to what is beyond the bandwidth, since the difference

@@ -20,8 +20,8 @@ import numpy as np
 from kinertia.model.compiled import Float2, Float3, Int2, compiled, part
 from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.smoothing import SmoothedSpline
-from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N, FootLoads
+from kinertia.trial.ground_contact import centre_of_pressure
 
 PLATE_UNKNOWNS = {"x": "m", "z": "m", "gain": "1", "free moment": "N m/N", "turn": "rad"}
 """Errors of each plate, with units: displacement in the floor's plane, relative error of the gain, missing vertical

@@ -28,8 +28,7 @@ from typing import Self
 import numpy as np
 
 from kinertia.model.anatomy import segment_of
-from kinertia.model.coordinate_pairs import skin_angles
-from kinertia.model.skeleton import Joint, Skeleton
+from kinertia.model.skeleton import Joint, Skeleton, skin_angles
 from kinertia.motion.workload import pieces
 
 EXPECTED_SD_M = {"thigh": 0.004, "shank": 0.003, "foot": 0.0015}

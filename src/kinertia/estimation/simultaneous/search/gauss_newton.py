@@ -23,7 +23,7 @@ import scipy.linalg
 from kinertia.estimation.simultaneous.linear_algebra.normal_equations import StaticInformation
 from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, GaussianPrior
 from kinertia.estimation.simultaneous.search.problem import Linearised, MapProblem, Point
-from kinertia.estimation.simultaneous.terms.calibration_terms import Displaced
+from kinertia.estimation.simultaneous.terms.model_terms import Displaced
 
 _MOST_PAIRS = 16
 _LEAST_CURVATURE = 0.02

@@ -1,10 +1,15 @@
 """Lists the cost terms of the simultaneous estimate. A new unknown is a new term."""
 
-from kinertia.estimation.simultaneous.terms.bsp_term import BodySegments, TaskMasses
-from kinertia.estimation.simultaneous.terms.calibration_terms import MarkerPositions, Skin, StaticCoordinates
 from kinertia.estimation.simultaneous.terms.cost_term import CostTerm
 from kinertia.estimation.simultaneous.terms.instrument_term import InstrumentErrors, MissingLoads
 from kinertia.estimation.simultaneous.terms.marker_terms import Markers
+from kinertia.estimation.simultaneous.terms.model_terms import (
+    BodySegments,
+    MarkerPositions,
+    Skin,
+    StaticCoordinates,
+    TaskMasses,
+)
 from kinertia.estimation.simultaneous.terms.motion_terms import JointRanges, Start
 from kinertia.estimation.simultaneous.terms.root_loads import RootLoads, TrunkBending
 

@@ -25,8 +25,8 @@ from kinertia.estimation.simultaneous.search.problem import MapProblem
 from kinertia.estimation.simultaneous.uncertainty.curve_variances import EndSpread, MotionSpread, write_variances
 from kinertia.estimation.simultaneous.uncertainty.model_errors import block_growth, knee_geometry
 from kinertia.estimation.simultaneous.uncertainty.moment_derivatives import MomentDerivatives, MomentsOfTrial
-from kinertia.motion.moving_windows import even_mean
 from kinertia.motion.workload import side_by_side
+from kinertia.trial.sampled_data import even_mean
 
 _FRAMES_AT_ONCE = 100
 """Number of frames processed at once; larger arrays would exceed the processor's cache."""

@@ -27,7 +27,7 @@ from kinertia.estimation.simultaneous.linear_algebra.normal_equations import SPL
 from kinertia.estimation.simultaneous.search.gauss_newton import GaussNewton
 from kinertia.estimation.simultaneous.search.problem import MapProblem, Point
 from kinertia.estimation.simultaneous.terms.instrument_term import InstrumentErrors
-from kinertia.estimation.simultaneous.uncertainty.knot_phases import OfPhases, followed
+from kinertia.estimation.simultaneous.uncertainty.marginal_posterior import OfPhases, followed
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.log_cholesky import dynamic_jacobian, nearest_consistent
 

@@ -7,7 +7,7 @@ import pytest
 
 from generic_static import generic_model, smooth_motion
 from kinertia.trial.data import FootLoads, Markers, Trial
-from kinertia.workflow.person_model import RotatedTrial, solved_trials
+from kinertia.workflow.person import RotatedTrial, solved_trials
 
 FRAMES, RATE = 101, 100.0
 

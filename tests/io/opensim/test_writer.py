@@ -6,9 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from generic_static import generic_model, random_coordinates
-from kinertia.io.opensim.editor import write_osim
-from kinertia.io.opensim.exporter import export_osim
 from kinertia.io.opensim.reader import read_osim
+from kinertia.io.opensim.writer import export_osim, write_osim
 from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.bsp import BodySegmentParameters
 from osim_comparison import RAJAGOPAL, SLOW_IF_LARGE, SMALL, SYNTHETIC, assert_opensim_agrees

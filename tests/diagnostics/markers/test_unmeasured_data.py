@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from kinertia.diagnostics.markers.computed_markers import computed_markers
+from kinertia.diagnostics.markers.unmeasured_data import computed_markers
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.trial.data import Markers
 from marker_contexts import codes, context_of

@@ -6,7 +6,7 @@ import pytest
 from kinertia.estimation.simultaneous.inputs import BSP
 from kinertia.estimation.simultaneous.search.gauss_newton import GaussNewton
 from kinertia.estimation.simultaneous.search.problem import Point
-from kinertia.estimation.simultaneous.uncertainty.knot_phases import PHASES, OfPhases, followed
+from kinertia.estimation.simultaneous.uncertainty.marginal_posterior import PHASES, OfPhases, followed
 from small_problem import point, small_problem
 from validation.study_bound import dense_band
 
