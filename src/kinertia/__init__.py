@@ -63,6 +63,7 @@ if TYPE_CHECKING:
     from kinertia.motion.dynamics import inverse_dynamics as inverse_dynamics
     from kinertia.motion.dynamics import residual as residual
     from kinertia.report.comparison.what_changed import compare as compare
+    from kinertia.report.comparison.what_changed import compare_group as compare_group
     from kinertia.report.exports.files import save_fit as save_fit
     from kinertia.report.exports.saved_fit import load_fit as load_fit
     from kinertia.settings import Attached as Attached
@@ -138,7 +139,7 @@ _ROOMS = {
     "studies.cross_validation": "HeldOut cross_validate",
     "studies.plan": "Plan plan",
     "cohort.tables": "read_cohort",
-    "report.comparison.what_changed": "compare",
+    "report.comparison.what_changed": "compare compare_group",
     "report.exports.files": "save_fit",
     "report.exports.saved_fit": "load_fit",
 }

@@ -30,6 +30,7 @@ from kinertia.cohort.learning import FOLDER as LEARNT
 from kinertia.cohort.learning import write_second_study
 from kinertia.cohort.local import fit_here, local_size
 from kinertia.cohort.page import write_cohort_page
+from kinertia.cohort.paired import Pair, changes_of, changes_sentence, mean_parts, pairs_of
 from kinertia.cohort.people import Participant, people_of
 from kinertia.cohort.record import Record, Standing, keep, prepare_folder, standings
 from kinertia.cohort.tables import write_tables
@@ -48,7 +49,7 @@ def cohort(
         Path,
         typer.Argument(
             help="A folder with a folder per person, each with a subject file; or a CSV file with a row per "
-            "person: subject (path of the subject file) and, optionally, name."
+            "person: subject (path of the subject file) and, optionally, name and session."
         ),
     ],
     output: Output = Path("out"),
@@ -67,6 +68,10 @@ def cohort(
             "go to the folder learnt.",
         ),
     ] = False,
+    conditions: Annotated[
+        tuple[str, str] | None,
+        typer.Option("--conditions", help="What changed from one to the other: conditions of trials, or sessions."),
+    ] = None,
     csv: Annotated[bool, typer.Option("--csv", help="Also write all tables as CSV.")] = False,
     norms: Annotated[
         Path | None, typer.Option(help="File of kinertia norms: adds Gait Profile Scores to tables and page.")
@@ -102,6 +107,8 @@ def cohort(
 
     kinertia cohort people.csv -o out --csv
 
+    kinertia cohort STUDY -o out --conditions before after
+
     kinertia cohort STUDY -o out --learn
 
     kinertia cohort STUDY -o out --scheduler tcp://node7:8786
@@ -112,22 +119,26 @@ def cohort(
     for one, other, both in (
         ("--scheduler", "--slurm", scheduler and slurm),
         ("--json", "--json-lines", as_json and json_lines),
+        ("--learn", "--conditions", learn and conditions),
     ):
         if both:
             raise SettingsError(f"{one} and {other}: give one of them")
     where = _Where(scheduler, None if slurm is None else read_slurm(slurm))
     lines = JsonLines(json_lines)
     be_quiet(quiet or json_lines)
-    wanted = _Wanted(csv, {} if norms is None else read_norms(norms))
+    wanted = _Wanted(csv, {} if norms is None else read_norms(norms), conditions)
     if norms is not None:
         expect_all_nine(wanted.norms)
     people = people_of(study, output)
+    if learn and any(one.session for one in people):
+        raise SettingsError("--learn does not know sessions: leave out the column 'session'")
+    pairs = [] if conditions is None else pairs_of(people, conditions)
     if dry_run:
         return _plan(people, output, where, lines)
     results_folder(output, overwrite)
     output.mkdir(parents=True, exist_ok=True)
     with sole_use(output / _LOCK, "the folder of this cohort"):
-        outcomes = _run(people, output, where, wanted, lines)
+        outcomes = _run(people, output, where, wanted, lines, pairs)
         if learn:
             outcomes += _run_again(people, outcomes, output, where, wanted, lines)
     fitted = [{**_ended(record), "fitted": record.fitted} for record in outcomes]
@@ -199,13 +210,21 @@ class _Where:
 
 @dataclass(frozen=True)
 class _Wanted:
-    """Options of the tables: whether to write CSV as well, and norms for the gait scores."""
+    """Options of the tables: whether to write CSV as well, norms for the gait scores, conditions to compare."""
 
     csv: bool
     norms: Mapping[str, Norm]
+    conditions: tuple[str, str] | None
 
 
-def _run(people: Sequence[Participant], output: Path, where: _Where, wanted: _Wanted, lines: JsonLines) -> list[Record]:
+def _run(
+    people: Sequence[Participant],
+    output: Path,
+    where: _Where,
+    wanted: _Wanted,
+    lines: JsonLines,
+    pairs: Sequence[Pair] = (),
+) -> list[Record]:
     """Fit the people who are due, and write everyone's tables and page."""
     prepare_folder(output)
     everybody = _standing(people, output, lines)
@@ -214,10 +233,13 @@ def _run(people: Sequence[Participant], output: Path, where: _Where, wanted: _Wa
     outcomes = [one.outcome(records.get(one.person.name), output) for one in everybody]
     with shown_progress() as shown:
         progress = lines.with_progress(shown)
-        write_tables(output, _each(outcomes, "tables", progress), wanted.csv, wanted.norms)
+        changes = changes_of(output, pairs, wanted.conditions, progress) if wanted.conditions else []
+        write_tables(output, _each(outcomes, "tables", progress), wanted.csv, wanted.norms, changes)
         progress("page", 0.0)
-        write_cohort_page(output)
+        write_cohort_page(output, mean_parts(changes, wanted.conditions))
     _report(outcomes, output)
+    if changes:
+        out.print(changes_sentence(changes), soft_wrap=True)
     fitted, passed = sum(one.fitted for one in outcomes), sum(not one.status for one in outcomes)
     lines.say("end", folder=str(output), people=len(outcomes), fitted=fitted, passed=passed)
     return outcomes

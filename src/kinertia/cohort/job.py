@@ -39,6 +39,7 @@ class Job:
         inputs: SHA-256 of what goes into the fit.
         trials: number of trials.
         limit_s: time after which its process is ended.
+        session: which of the person's sessions it is; empty where there is one only.
         kinertia: version of the command, which has to be the worker's.
         run: identifier of the job, of which each run of the command has another.
     """
@@ -49,6 +50,7 @@ class Job:
     inputs: str
     trials: int
     limit_s: float
+    session: str = ""
     kinertia: str = VERSION
     run: str = field(default_factory=lambda: uuid4().hex)
 
@@ -58,7 +60,8 @@ class Job:
         if one.person.subject is None:
             raise ValueError(f"{one.person.name} is not due")
         limit_s = _LEAST_LIMIT_S + _PATIENCE * guessed_seconds([one], 1)
-        return cls(one.person.name, one.person.subject.resolve(), cohort, one.inputs, one.trials, limit_s)
+        person = one.person
+        return cls(person.name, one.person.subject.resolve(), cohort, one.inputs, one.trials, limit_s, person.session)
 
     @classmethod
     def of_text(cls, text: str) -> Self:

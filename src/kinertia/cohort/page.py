@@ -6,7 +6,7 @@ Made from the cohort's tables: for ten thousand people, curves are summed in pie
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import quote
@@ -58,10 +58,10 @@ _MOST_NAMES, _MOST_PEOPLE = 5, 20
 _HEADINGS = ("code", "severity", "finding", "people", "open", "explained by another", "overruled", "median size", "who")
 
 
-def write_cohort_page(folder: Path) -> None:
-    """Write the page beside the tables that `write_tables` has written into the folder."""
+def write_cohort_page(folder: Path, of_changes: Iterable[Part] = ()) -> None:
+    """Write the page beside the tables that `write_tables` has written into the folder; changes come first."""
     people = _read(folder, "people", PEOPLE)
-    parts = list(outcome_parts(people, _read(folder, "findings", FINDINGS)))
+    parts = [*of_changes, *outcome_parts(people, _read(folder, "findings", FINDINGS))]
     if (people["status"] <= AGAINST).any():
         bsp = _read(folder, "cohort", ("person", "segment", "parameter", "literature", "estimate", "sd"))
         parts += [*_changes(bsp), _residuals(folder), _outliers(bsp), *score_parts(folder), *_mean_curves(folder)]

@@ -1,7 +1,7 @@
 """Lists the people of a study: a folder with a folder per person, or a CSV file with a row per person."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from kinertia.errors import FileError
@@ -23,11 +23,18 @@ class Participant:
         name: name in tables, and of the folder of results.
         subject: the subject file; None where there is none.
         problem: why there is none, in one line; empty otherwise.
+        session: which of the person's sessions it is, of a row that states it: `name` then ends with it.
     """
 
     name: str
     subject: Path | None
     problem: str = ""
+    session: str = ""
+
+    @property
+    def person(self) -> str:
+        """Name of the person, without the session."""
+        return self.name.removesuffix(f" {self.session}") if self.session else self.name
 
 
 def people_of(study: Path, output: Path) -> list[Participant]:
@@ -35,7 +42,7 @@ def people_of(study: Path, output: Path) -> list[Participant]:
 
     Args:
         study: a folder with one folder per person, each with a subject file; or a CSV file with the columns `subject`
-            (path of a subject file, from the CSV file's folder) and, optionally, `name`.
+            (path of a subject file, from the CSV file's folder) and, optionally, `name` and `session`.
         output: folder for the results, which may be inside the study and is not a person's.
 
     Raises:
@@ -113,10 +120,14 @@ def _of_rows(path: Path) -> Iterator[tuple[int, Participant]]:
         if not written:
             raise FileError(path, "the column 'subject' is empty; give the path of a subject file", row.line)
         subject = path_from(path.parent, written)
+        name, session = (row.cells.get(column, "") for column in ("name", "session"))
+        if session and not name:
+            raise FileError(path, "a row with a session needs the person's name in the column 'name'", row.line)
         if subject.is_dir():
-            yield row.line, _with_subject_in(subject, row.cells.get("name") or subject.resolve().name)
+            person = _with_subject_in(subject, name or subject.resolve().name)
         else:
-            yield row.line, Participant(row.cells.get("name") or _name_of(subject), subject)
+            person = Participant(name or _name_of(subject), subject)
+        yield row.line, replace(person, name=f"{person.name} {session}", session=session) if session else person
 
 
 def _name_of(subject: Path) -> str:

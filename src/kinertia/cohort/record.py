@@ -168,7 +168,7 @@ def standings(people: Sequence[Participant], cohort: Path) -> Iterator[Standing]
         try:
             wanted = None if person.subject is None else read_subject(person.subject)
             content = {} if wanted is None else _contents(wanted.model_dump())
-            inputs = "" if wanted is None else _hash(content)
+            inputs = "" if wanted is None else _hash(_for_session(content, person.session))
             if wanted is not None:
                 _expect_new(person.name, content, met)
                 _expect_forces(wanted)
@@ -181,12 +181,16 @@ def standings(people: Sequence[Participant], cohort: Path) -> Iterator[Standing]
         yield Standing(person, len(trials), frames, inputs, record, person.problem)
 
 
-def inputs_of(wanted: SubjectFile) -> str:
+def inputs_of(wanted: SubjectFile, session: str = "") -> str:
     """Return the SHA-256 of every entry of a subject file, defaults included, with the content of its files.
 
-    Paths and names of the files do not affect it, nor do comments.
+    Paths and names of the files do not affect it, nor do comments. Sessions are estimated otherwise.
     """
-    return _hash(_contents(wanted.model_dump()))
+    return _hash(_for_session(_contents(wanted.model_dump()), session))
+
+
+def _for_session(content: Mapping[str, Any], session: str) -> Mapping[str, Any]:
+    return {**content, "session": True} if session else content
 
 
 def _expect_new(name: str, content: Mapping[str, Any], met: dict[str, str]) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from datetime import date
@@ -16,8 +16,10 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from kinertia.cohort.cluster import expect_extra
+from kinertia.cohort.paired import PersonChanges, means_of
 from kinertia.cohort.record import AGAINST, PASSED, Place, Record
 from kinertia.errors import FileError, KinertiaError, findings_of
+from kinertia.estimation.changes.change import SOURCES
 from kinertia.estimation.result.cycles import UNITS, cycle_columns
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.gait_scores import OVERALL
@@ -28,6 +30,7 @@ from kinertia.findings.overview import Overview, finding_columns
 from kinertia.io.norms_file import Norm
 from kinertia.io.results.working_folder import working_folder
 from kinertia.io.text.csv_file import inert, read_csv
+from kinertia.report.comparison.change_tables import group_columns
 from kinertia.report.exports.files import summary
 from kinertia.report.exports.saved_fit import load_fit
 from kinertia.report.figures.cycle_figures import MOST_STRIDES, titled_quantities
@@ -40,6 +43,7 @@ _STAGES = ("literature", "corrected", "estimate")
 _RESIDUALS = [
     f"{kind}_{size}_{stage}" for kind in ("residual", "full_residual") for size in _SIZES for stage in _STAGES
 ]
+_OUTCOME = ("quantity", "joint", "component", "side", "event", "unit")
 _NUMBERS = ("cutoff_hz", "motion_hz", "force_cutoff_hz", "impact_force_rms_N", "mass_from_force_kg")
 _COLUMNS: Mapping[str, Mapping[str, str]] = {
     "cohort": {
@@ -77,6 +81,24 @@ _COLUMNS: Mapping[str, Mapping[str, str]] = {
         "degrees": "double",
         "remarks": "string",
     },
+    "changes": {
+        "person": "string",
+        **dict.fromkeys(_OUTCOME, "string"),
+        **dict.fromkeys(("before", "after", "difference", "sd"), "double"),
+        **dict.fromkeys((f"sd_{source}" for source in SOURCES), "double"),
+        **dict.fromkeys(("sd_between_strides_before", "sd_between_strides_after"), "double"),
+        "spread_assumed": "bool",
+        "walks_needed": "int64",
+        **dict.fromkeys(("mdc95", "p"), "double"),
+        **dict.fromkeys(("strides_before", "strides_after"), "int64"),
+        **dict.fromkeys(("verdict", "remarks"), "string"),
+    },
+    "change_means": {
+        **dict.fromkeys(_OUTCOME, "string"),
+        **dict.fromkeys(("people", "changed"), "int64"),
+        **dict.fromkeys(("before", "after", "difference", "sd", "sd_measurement", "sd_true"), "double"),
+        **dict.fromkeys(("standard_error", "lower", "upper", "p"), "double"),
+    },
     "people": {
         "person": "string",
         "status": "int64",
@@ -90,6 +112,7 @@ _COLUMNS: Mapping[str, Mapping[str, str]] = {
     },
 }
 """Columns of every table with their types, as pyarrow names them."""
+_CHANGES = ("changes", "change_means")
 OF_A_PERSON = ("cohort", "trials", "findings", "cycles", "instruments")
 _ROWS_AT_ONCE, _PEOPLE_AT_ONCE = 50_000, 200
 """The first to be reached ends a piece of a table. A file keeps a line on each column of each piece, which for ten
@@ -131,16 +154,23 @@ def _write_rows(path: Path, name: str, person: str, columns: Mapping[str, Any]) 
 
 
 def write_tables(
-    cohort: Path, records: Iterable[Record], with_csv: bool, norms: Mapping[str, Norm] = MappingProxyType({})
+    cohort: Path,
+    records: Iterable[Record],
+    with_csv: bool,
+    norms: Mapping[str, Norm] = MappingProxyType({}),
+    changes: Sequence[PersonChanges] = (),
 ) -> None:
     """Write all people's rows, in the order of the records, into the folder of the cohort; each table at once.
 
     Only one piece at a time is in memory, however many people there are. The list of people is always written as CSV
-    too. Scores are against the norms; without any there are none.
+    too, and so are changes. Scores are against the norms; without any there are none.
     """
     from pyarrow import parquet
 
-    with _tables_in(cohort, with_csv) as tables:
+    with _tables_in(cohort, with_csv, ("people", *(_CHANGES if changes else ()))) as tables:
+        for one in changes:
+            tables["changes"].add(_table("changes", one.columns()))
+        tables["change_means"].add(_table("change_means", group_columns(means_of(changes))))
         for record in records:
             tables["people"].add(_table("people", {name: [value] for name, value in asdict(record).items()}))
             if record.fitted:
@@ -178,8 +208,8 @@ def read_cohort(folder: str | Path) -> dict[str, Any]:
 
     Returns:
         by name: "cohort" (body segment parameters), "trials", "findings", "cycles", "instruments" (plates and
-        synchronisation), "scores" (of gait, against norms), and "people" (who is in the cohort, and how each fit
-        ended).
+        synchronisation), "scores" (of gait, against norms), "changes" and "change_means" (between two conditions, of
+        everyone and on average), and "people" (who is in the cohort, and how each fit ended).
 
     Raises:
         FileError: no cohort is there.
@@ -259,13 +289,14 @@ def _scores(person: str, folder: Path, norms: Mapping[str, Norm]) -> dict[str, A
 
 
 def _table(name: str, columns: Mapping[str, Any]) -> pyarrow.Table:
-    """Build a table with its types; unknown values are null."""
+    """Build a table with its types; unknown values and columns are null."""
     import pyarrow
 
     schema = pyarrow.schema(list(_COLUMNS[name].items()))
+    rows = len(next(iter(columns.values())))
     return pyarrow.table(
         {
-            key: pyarrow.array(columns[key], field.type, from_pandas=True)
+            key: pyarrow.array(columns.get(key, [None] * rows), field.type, from_pandas=True)
             for key, field in zip(schema.names, schema, strict=True)
         },
         schema,
@@ -309,14 +340,14 @@ class _GrowingTable:
 
 
 @contextmanager
-def _tables_in(folder: Path, with_csv: bool) -> Iterator[dict[str, _GrowingTable]]:
+def _tables_in(folder: Path, with_csv: bool, as_csv: Collection[str]) -> Iterator[dict[str, _GrowingTable]]:
     """Yield tables to add to; their files replace older ones when the block ends without an error."""
     with working_folder(folder) as work:
         with ExitStack() as open_files:
             tables = {}
             for name in _COLUMNS:
                 # a CSV file of an earlier run, with other people, is not left behind
-                wanted = with_csv or name == "people" or (folder / f"{name}.csv").exists()
+                wanted = with_csv or name in as_csv or (folder / f"{name}.csv").exists()
                 csv_path = work / f"{name}.csv" if wanted else None
                 tables[name] = _GrowingTable(work / f"{name}.parquet", name, csv_path, open_files)
             yield tables

@@ -33,6 +33,7 @@ from kinertia.io.subject.provenance import command_line, provenance_of
 from kinertia.io.subject.reader import read_subject
 from kinertia.io.subject.tables import SubjectFile
 from kinertia.io.versions import VERSION
+from kinertia.report.comparison.what_changed import fit_session
 from kinertia.report.exports.files import save_fit
 from kinertia.studies.parallel import one_thread
 from kinertia.workflow.from_files import fit_subject
@@ -73,7 +74,7 @@ def _fitted(job: Job, started: float) -> Record:
     wanted = read_subject(job.subject)
     overruled = _overruled(wanted)
     try:
-        fit = fit_subject(wanted)
+        fit = fit_session(wanted) if job.session else fit_subject(wanted)
     except KinertiaError as error:
         write_findings(Place(job.cohort, job.person).findings, job.person, error)
         record = job.record(BAD_INPUT, str(error), _unchanged(job), time.perf_counter() - started)
@@ -107,7 +108,7 @@ def _save(fit: Fit, wanted: SubjectFile, job: Job, record: Record) -> None:
 def _unchanged(job: Job) -> bool:
     """Return whether the files are still unchanged: an error of an unavailable drive is not the files'."""
     try:
-        return inputs_of(read_subject(job.subject)) == job.inputs
+        return inputs_of(read_subject(job.subject), job.session) == job.inputs
     except (KinertiaError, OSError):
         return False
 

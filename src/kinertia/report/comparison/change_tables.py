@@ -1,13 +1,14 @@
 """Shows what changed between two conditions: words, tables, and curves with their bands."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from typing import Any
 
 import numpy as np
 
 from kinertia.estimation.changes.change import MOST_WALKS, NOTABLE, PRIMARY, SOURCES, Change
 from kinertia.estimation.changes.curve_changes import CurveChange
+from kinertia.estimation.changes.group_changes import GroupChange
 from kinertia.report.figures import style
 from kinertia.report.figures.cycle_figures import band, mean_line
 from kinertia.report.figures.figure import Figure, Panel, plain, shaded, small_multiples, written
@@ -116,6 +117,15 @@ def change_columns(found: Sequence[Change]) -> dict[str, list[Any]]:
     }
 
 
+def person_columns(person: str, found: Sequence[Change]) -> dict[str, list[Any]]:
+    """Return the columns of a cohort's `changes.csv`: the rows of one person, with what keeps one from being judged."""
+    return {
+        "person": [person] * len(found),
+        **change_columns(found),
+        "remarks": [one.doubt for one in found],
+    }
+
+
 def curve_columns(found: Sequence[CurveChange]) -> dict[str, list[Any]]:
     """Return the columns of `change_curves.csv`: a row per curve and percent, with the simultaneous band."""
     rows = [(one, k) for one in found for k in range(len(one.before))]
@@ -150,7 +160,36 @@ def change_rows(found: Sequence[Change]) -> list[dict[str, Any]]:
     ]
 
 
-def outcome_words(one: Change | CurveChange) -> str:
+def group_columns(found: Sequence[GroupChange]) -> dict[str, list[Any]]:
+    """Return the columns of `change_means.csv`: a row per outcome."""
+    return {each.name: [getattr(one, each.name) for one in found] for each in fields(GroupChange)}
+
+
+def group_rows(found: Sequence[GroupChange]) -> list[tuple[str, ...]]:
+    """Return rows of text: speed, steps and the outcomes that were named beforehand."""
+    chosen = [one for one in found if one.quantity == "gait" or one.primary]
+    return [_group_row(one) for one in chosen]
+
+
+def _group_row(one: GroupChange) -> tuple[str, ...]:
+    side = f"{SIDES[one.side][0]} " if one.side else ""
+    event = f", {one.event}" if one.event else ""
+    digits = _DIGITS[one.unit]
+    known = one.people > 1
+    return (
+        f"{side}{outcome_words(one)}{event}",
+        one.unit,
+        str(one.people),
+        f"{one.before:.{digits}f}",
+        f"{one.after:.{digits}f}",
+        f"{one.difference:+.{digits}f}",
+        f"{one.lower:+.{digits}f} to {one.upper:+.{digits}f}" if known else "",
+        f"{one.sd:.{digits}f}" if known else "",
+        str(one.changed),
+    )
+
+
+def outcome_words(one: Change | CurveChange | GroupChange) -> str:
     """Return what a change is of: "knee adduction moment", "walking speed"."""
     quantity = "" if one.quantity == "gait" else f" {one.quantity}"
     return f"{one.joint} {one.component}{quantity}".replace("_", " ")

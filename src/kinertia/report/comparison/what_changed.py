@@ -4,15 +4,18 @@ What all trials of one estimate share cancels in a difference, and what the esti
 remains are errors of one condition only, and errors that a user waived.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from kinertia.errors import KinertiaError
 from kinertia.estimation.changes.change import Change, gait_changes, profile_changes, speed_change
 from kinertia.estimation.changes.condition_changes import changes_of_strides, condition_features, masks_of
 from kinertia.estimation.changes.curve_changes import CurveChange, apart, curve_changes, paired, rows_of
+from kinertia.estimation.changes.group_changes import group_changes
 from kinertia.estimation.changes.session_changes import (
     Session,
     changes_between,
@@ -27,6 +30,7 @@ from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.findings.finding import Finding, Severity
 from kinertia.io.norms_file import Norm, read_norms
 from kinertia.io.subject.reader import read_subject
+from kinertia.io.subject.tables import SubjectFile
 from kinertia.report.comparison.change_tables import (
     RELEVANT,
     change_rows,
@@ -34,13 +38,18 @@ from kinertia.report.comparison.change_tables import (
     changed_sentence,
     changes_summary,
     curve_figures,
+    group_columns,
     limit_sentences,
+    person_columns,
     speed_sentence,
 )
 from kinertia.report.exports.saved_fit import load_fit
 from kinertia.report.pages.rendering import rendered
 from kinertia.workflow.estimate import estimate
 from kinertia.workflow.from_files import fit_subject, prepare_subject
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _INSTRUMENTS = ("P", "T")
 _LEFT_OUT = frozenset({"P271", "P272", "P276", "P278", "P279", "P280", "P281", "P283", "P290"})
@@ -110,6 +119,48 @@ class Comparison:
     def summary(self) -> dict[str, Any]:
         """What `kinertia compare --json` prints of it."""
         return {**changes_summary(self.before, self.after, self.outcomes, self.speed, self.gait), "doubt": self.doubt}
+
+
+@dataclass(frozen=True)
+class GroupComparison:
+    """What changed in a group: `people` by name, each before and after.
+
+    Examples:
+        >>> found = kinertia.compare_group({"Anna": anna, "Ben": ben})  # doctest: +SKIP
+        >>> found.means.query("changed > 0")[["joint", "component", "difference", "sd_true"]]  # doctest: +SKIP
+    """
+
+    people: Mapping[str, Comparison]
+
+    @property
+    def changes(self) -> pd.DataFrame:
+        """One row per person and outcome, walking speed and steps first: for mixed models."""
+        import pandas as pd
+
+        tables = (person_columns(name, (*one.steps, *one.outcomes)) for name, one in self.people.items())
+        return pd.concat([pd.DataFrame(columns) for columns in tables], ignore_index=True)
+
+    @property
+    def means(self) -> pd.DataFrame:
+        """One row per outcome: mean change with its 95 % interval, and how differently people changed."""
+        import pandas as pd
+
+        every = {name: (*one.steps, *one.outcomes) for name, one in self.people.items()}
+        return pd.DataFrame(group_columns(group_changes(every)))
+
+
+def compare_group(people: Mapping[str, Comparison]) -> GroupComparison:
+    """Average what changed in each person (`compare`) over a group: a paired comparison.
+
+    Args:
+        people: by name, each with the same two conditions.
+
+    Raises:
+        KinertiaError: nobody is given.
+    """
+    if not people:
+        raise KinertiaError("give at least one person")
+    return GroupComparison(people)
 
 
 def compare(
@@ -255,7 +306,7 @@ def _kind(one: Finding) -> tuple[str, str | None, str | None]:
     return one.code, one.where.plate, one.where.axis
 
 
-def fit_session(subject: Path, progress: Progress = lambda stage, share: None) -> Fit:
+def fit_session(subject: Path | SubjectFile, progress: Progress = lambda stage, share: None) -> Fit:
     """Estimate a session from its subject file.
 
     Axes of knees, ankles and elbows of the built-in model are estimated where there is a static trial, unless the file
@@ -264,7 +315,7 @@ def fit_session(subject: Path, progress: Progress = lambda stage, share: None) -
     Raises:
         KinertiaError: a file is missing or broken, or something in it cannot be used.
     """
-    wanted = read_subject(subject)
+    wanted = subject if isinstance(subject, SubjectFile) else read_subject(subject)
     if wanted.settings.joint_axes is None and wanted.model.osim is None and wanted.model.static is not None:
         settings = wanted.settings.model_copy(update={"joint_axes": True})
         wanted = wanted.model_copy(update={"settings": settings})

@@ -1,0 +1,106 @@
+"""Averages the changes of a group, each person before and after: a paired comparison.
+
+The deviation of the changes between people contains each person's own error of measurement. What remains without it,
+
+    s_true^2 = max(0, s^2 - mean sd_i^2),
+
+is how differently people changed. The mean change has the standard error s / sqrt(n), errors of measurement included,
+as long as they are independent from person to person: an error of plates that everyone shares is not in it.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from kinertia.estimation.changes.change import PRIMARY, Change
+
+Named = tuple[str, str, str, str, str, str]
+
+
+@dataclass(frozen=True)
+class GroupChange:
+    """The change of one outcome in a group.
+
+    Attributes:
+        quantity, joint, component, side, event, unit: as of `Change`.
+        people: number of people whose change is averaged: not those with a `doubt`.
+        changed: number of them whose own change is shown.
+        before, after, difference: means over people.
+        sd: standard deviation of the changes between people; NaN for one person, as are all numbers below but the next.
+        sd_measurement: root mean square of the people's own standard deviations.
+        sd_true: standard deviation of the changes without these errors.
+        standard_error: of the mean change.
+        lower, upper: its 95 % interval, by Student's t.
+        p: probability of at least this mean change without any.
+
+    Examples:
+        >>> named = "moment", "knee", "adduction", "r", "loading", "N m/kg"
+        >>> anna, ben = (Change(*named, 0.4, after, (3, 3), 0.02, {}, 0.05) for after in (0.3, 0.2))
+        >>> (found,) = group_changes({"Anna": [anna], "Ben": [ben]})
+        >>> round(found.difference, 3), round(found.sd, 3), round(found.sd_true, 3), found.changed
+        (-0.15, 0.071, 0.068, 2)
+    """
+
+    quantity: str
+    joint: str
+    component: str
+    side: str
+    event: str
+    unit: str
+    people: int
+    changed: int
+    before: float
+    after: float
+    difference: float
+    sd: float
+    sd_measurement: float
+    sd_true: float
+    standard_error: float
+    lower: float
+    upper: float
+    p: float
+
+    @property
+    def primary(self) -> bool:
+        """Whether the outcome was named beforehand."""
+        return (self.quantity, self.joint, self.component, self.event) in PRIMARY
+
+
+def group_changes(people: Mapping[str, Sequence[Change]]) -> tuple[GroupChange, ...]:
+    """Average the changes of each outcome over the people who have it, in the order of their first appearance."""
+    outcomes: dict[Named, list[Change]] = {}
+    for changes in people.values():
+        for one in changes:
+            if not one.doubt:
+                outcomes.setdefault((one.quantity, one.joint, one.component, one.side, one.event, one.unit), []).append(
+                    one
+                )
+    return tuple(_averaged(named, some) for named, some in outcomes.items())
+
+
+def _averaged(named: Named, some: Sequence[Change]) -> GroupChange:
+    differences = np.array([one.difference for one in some])
+    count, mean = len(some), float(differences.mean())
+    measured = float(np.sqrt(np.mean([one.sd**2 for one in some])))
+    sd = float(differences.std(ddof=1)) if count > 1 else np.nan
+    error = sd / np.sqrt(count)
+    student = stats.t(max(count - 1, 1))
+    half = float(student.ppf(0.975)) * error
+    p = float(2.0 * student.sf(abs(mean) / max(error, 1e-300))) if count > 1 else np.nan
+    return GroupChange(
+        *named,
+        people=count,
+        changed=sum(one.verdict == "changed" for one in some),
+        before=float(np.mean([one.before for one in some])),
+        after=float(np.mean([one.after for one in some])),
+        difference=mean,
+        sd=sd,
+        sd_measurement=measured,
+        sd_true=float(np.sqrt(max(sd**2 - measured**2, 0.0))) if count > 1 else np.nan,
+        standard_error=float(error),
+        lower=mean - half,
+        upper=mean + half,
+        p=p,
+    )
