@@ -6,8 +6,8 @@ the severities found of each. Where the quantity is not the limit's own, a funct
 
 import numpy as np
 
-from kinertia.diagnostics.labels.swapped_markers import rigidity
 from kinertia.diagnostics.markers.axes_and_floor import unit_and_vertical
+from kinertia.diagnostics.markers.swapped_markers import rigidity
 from kinertia.diagnostics.markers.trajectories import precision, trajectories, visible
 from kinertia.diagnostics.markers.unmeasured_data import frames
 from kinertia.model.marker_set import MarkerSet

@@ -7,6 +7,8 @@ import numpy as np
 from kinertia.diagnostics.evidence.force_mass import ForceMass
 from kinertia.diagnostics.evidence.segment_distances import LOWER_BODY
 from kinertia.diagnostics.markers import axes_and_floor
+from kinertia.diagnostics.plates import contact_delays, force_timing
+from kinertia.diagnostics.plates.force_timing import TrialDelay, force_rate, uneven_delays
 from kinertia.diagnostics.plates.ground_contact import foreign_load
 from kinertia.diagnostics.subject import body_data, movements
 from kinertia.diagnostics.subject.body_data import stated_and_filed
@@ -14,8 +16,6 @@ from kinertia.diagnostics.subject.mass import masses_of_trials, stated_mass
 from kinertia.diagnostics.subject.movements import flat_feet
 from kinertia.diagnostics.subject.same_person import static_and_trials, trials_of_one_person
 from kinertia.diagnostics.subject.same_session import trial_scales
-from kinertia.diagnostics.timing import contact_delays, force_timing
-from kinertia.diagnostics.timing.force_timing import TrialDelay, force_rate, uneven_delays
 from kinertia.estimation.prepare.prepared import TotalMass
 from kinertia.findings.quantity import Where
 from kinertia.model.marker_set import MarkerSet

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from kinertia.report.pages.sensitivity import save_sensitivity
+from kinertia.report.pages.study_pages import save_sensitivity
 from kinertia.studies.sensitivity import run_sensitivity
 from validation.page import PAGES, write_page
 

@@ -4,13 +4,13 @@ import shutil
 
 import pytest
 
-from kinertia.cli import terminal
+from kinertia.cli import common
 
 
 @pytest.fixture(autouse=True)
 def not_quiet(monkeypatch):
     """No test is quiet because the command of an earlier one was: in use, each command is a process of its own."""
-    monkeypatch.setattr(terminal.out, "quiet", False)
+    monkeypatch.setattr(common.out, "quiet", False)
 
 
 @pytest.fixture

@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import pytest
 
 from command_line import fitted, run
-from kinertia.cli import terminal
-from kinertia.cli.findings_view import report_tables
+from kinertia.cli import common
+from kinertia.cli.findings import report_tables
 from kinertia.findings.finding import Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.report.exports.files import summary
@@ -36,7 +36,7 @@ MASSES = {"stated": "measured", "literature": "literature", "estimate": "estimat
 
 def test_tables_are_short_readable_and_say_what_was_used(fit, two_level):
     for one in (fit, two_level):
-        with terminal.out.capture() as captured:
+        with common.out.capture() as captured:
             report_tables(one)
         lines = captured.get().splitlines()
         assert max(len(line) for line in lines if not line.startswith("assumed: ")) <= 80
@@ -63,7 +63,7 @@ def test_a_fit_with_a_model_says_model_and_what_is_kept(fit):
     prior_sd, sd = fit.posterior.prior_sd.copy(), fit.posterior.sd.copy()
     prior_sd[-1] = sd[-1] = 0.0
     posterior = replace(fit.posterior, prior_sd=prior_sd, sd=sd)
-    with terminal.out.capture() as captured:
+    with common.out.capture() as captured:
         report_tables(replace(fit, posterior=posterior, file=SimpleNamespace(bsp=fit.estimate)))
     shown = captured.get()
     assert "literature" not in shown.replace("from the literature", "")

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from command_line import run
-from kinertia.cli.report import score_text
+from kinertia.cli.results import score_text
 from kinertia.errors import SessionError
 from kinertia.estimation.learnt_prior import information_of
 from kinertia.estimation.prior import literature_prior

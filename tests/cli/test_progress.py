@@ -7,7 +7,7 @@ import time
 import pytest
 from rich.console import Console
 
-from kinertia.cli import terminal
+from kinertia.cli import common
 
 
 @pytest.mark.slow
@@ -17,8 +17,8 @@ def test_progress_is_plain_lines_in_a_log(fit_of):
 
 def test_progress_is_a_bar_with_the_time_left_of_the_stage_on_a_terminal(monkeypatch):
     screen = io.StringIO()
-    monkeypatch.setattr(terminal.err, "console", Console(file=screen, force_terminal=True, width=80))
-    with terminal.shown_progress() as progress:
+    monkeypatch.setattr(common.err, "console", Console(file=screen, force_terminal=True, width=80))
+    with common.shown_progress() as progress:
         progress("reading", 0.9)
         progress("estimate", 0.0)
         for share in (0.2, 0.4, 0.6):
@@ -33,8 +33,8 @@ def test_progress_is_a_bar_with_the_time_left_of_the_stage_on_a_terminal(monkeyp
 
 def test_quiet_progress(monkeypatch):
     screen = io.StringIO()
-    monkeypatch.setattr(terminal.err, "console", Console(file=screen, force_terminal=True, width=80))
-    monkeypatch.setattr(terminal.out, "quiet", True)
-    with terminal.shown_progress() as progress:
+    monkeypatch.setattr(common.err, "console", Console(file=screen, force_terminal=True, width=80))
+    monkeypatch.setattr(common.out, "quiet", True)
+    with common.shown_progress() as progress:
         progress("reading", 0.9)
     assert screen.getvalue() == ""

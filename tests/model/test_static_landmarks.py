@@ -7,7 +7,7 @@ import pytest
 
 from generic_static import recording, standing_positions
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.labels.marker_set import landmarks
+from kinertia.diagnostics.markers.marker_set import landmarks
 from kinertia.findings.finding import Severity
 from kinertia.io.marker_set_draft import draft_marker_set
 from kinertia.io.marker_set_file import read_marker_set

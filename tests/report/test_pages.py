@@ -15,8 +15,7 @@ from kinertia.cohort.page import PAGE, write_cohort_page
 from kinertia.report.comparison.side_by_side import render_comparison
 from kinertia.report.pages.check_page import save_check_page
 from kinertia.report.pages.page import render
-from kinertia.report.pages.plan_page import render_crossval, render_plan
-from kinertia.report.pages.sensitivity import render_sensitivity
+from kinertia.report.pages.study_pages import render_crossval, render_plan, render_sensitivity
 from kinertia.report.pages.table1 import render_table1, render_variants
 from kinertia.settings import Subject
 from kinertia.workflow.check import check_person, files_by_name, read_files

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.diagnostics.evidence.foot_trajectories import foot_trajectories
-from kinertia.diagnostics.timing.force_timing import belt_speed
+from kinertia.diagnostics.plates.force_timing import belt_speed
 from kinertia.io.subject.person_recordings import read_belt
 from kinertia.trial.file_contents import Belt
 from kinertia.trial.plate_assignment import build_trial

@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
+from kinertia.cli.common import out, print_json
 from kinertia.cli.demo import write_measured_lab, write_synthetic_lab
-from kinertia.cli.terminal import out, print_json
 from kinertia.errors import KinertiaError, how_to_install
 
 _EXAMPLES: dict[str, Callable[[Path], object]] = {"measured": write_measured_lab, "synthetic": write_synthetic_lab}

@@ -9,8 +9,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from kinertia.cli.findings_view import show_idle_waivers, show_overview, waivers_reported
-from kinertia.cli.options import (
+from kinertia.cli.common import (
     Calibrate,
     Forces,
     Height,
@@ -25,10 +24,13 @@ from kinertia.cli.options import (
     Static,
     Verbose,
     Waive,
+    out,
     overrule_of,
+    plain_table,
     results_folder,
+    shown_progress,
 )
-from kinertia.cli.terminal import out, plain_table, shown_progress
+from kinertia.cli.findings import show_idle_waivers, show_overview, waivers_reported
 from kinertia.errors import FileError
 from kinertia.estimation.prepare.prepared import Progress
 from kinertia.findings.overview import Overview

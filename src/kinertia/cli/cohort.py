@@ -14,8 +14,18 @@ from typing import Annotated, Any
 
 import typer
 
-from kinertia.cli.options import Outcome, Output, Overwrite, Quiet, results_folder
-from kinertia.cli.terminal import be_quiet, finite, out, plain_table, shown_progress
+from kinertia.cli.common import (
+    Outcome,
+    Output,
+    Overwrite,
+    Quiet,
+    be_quiet,
+    finite,
+    out,
+    plain_table,
+    results_folder,
+    shown_progress,
+)
 from kinertia.cohort.cluster import (
     SlurmFile,
     doubts_of_workers,

@@ -15,8 +15,7 @@ from typing import Annotated, Any, NoReturn, cast
 
 import typer
 
-from kinertia.cli.options import add_command, of_error
-from kinertia.cli.terminal import err, out, print_json, show_error, show_problem
+from kinertia.cli.common import add_command, err, of_error, out, print_json, show_error, show_problem
 from kinertia.errors import KinertiaError, internal_error
 from kinertia.findings.extensions import ExtensionError
 from kinertia.io.results.output_folder import INTERRUPTIONS
@@ -73,14 +72,14 @@ _MODULES = {
     "init": "drafts",
     "check": "check",
     "fit": "fit",
-    "compare": "compare",
-    "export": "export",
+    "compare": "results",
+    "export": "results",
     "cohort": "cohort",
-    "explain": "explain",
+    "explain": "findings",
 }
 _MORE = {
     "markers": "drafts",
-    "report": "report",
+    "report": "results",
     "crossval": "studies",
     "plan": "studies",
     "instruments": "learning",

@@ -14,9 +14,8 @@ import numpy as np
 import pandas as pd
 import typer
 
-from kinertia.cli.findings_view import show_coverage, show_overview
-from kinertia.cli.options import Outcome, Output, Overwrite, Quiet, results_folder
-from kinertia.cli.terminal import out, plain_table, shown_progress
+from kinertia.cli.common import Outcome, Output, Overwrite, Quiet, out, plain_table, results_folder, shown_progress
+from kinertia.cli.findings import show_coverage, show_overview
 from kinertia.estimation.prepare.prepared import Progress
 from kinertia.estimation.result.fit import Fit
 from kinertia.io.results.output_folder import complete_folder

@@ -6,8 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from kinertia.cli.options import Outcome
-from kinertia.cli.terminal import out, plain_table
+from kinertia.cli.common import Outcome, out, plain_table
 from kinertia.errors import FileError
 from kinertia.io.file_names import missing_file
 from kinertia.io.marker_set_draft import draft_marker_set, preset_of

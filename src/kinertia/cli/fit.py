@@ -8,15 +8,7 @@ from typing import Annotated, Any, get_args
 import numpy as np
 import typer
 
-from kinertia.cli.findings_view import (
-    next_commands,
-    report_tables,
-    show_coverage,
-    show_idle_waivers,
-    show_overview,
-    waivers_reported,
-)
-from kinertia.cli.options import (
+from kinertia.cli.common import (
     Calibrate,
     Forces,
     Height,
@@ -33,10 +25,20 @@ from kinertia.cli.options import (
     Verbose,
     Waive,
     of_error,
+    out,
     overrule_of,
     results_folder,
+    show_problem,
+    shown_progress,
 )
-from kinertia.cli.terminal import out, show_problem, shown_progress
+from kinertia.cli.findings import (
+    next_commands,
+    report_tables,
+    show_coverage,
+    show_idle_waivers,
+    show_overview,
+    waivers_reported,
+)
 from kinertia.errors import FileError, KinertiaError
 from kinertia.estimation.result.fit import Fit
 from kinertia.io.file_names import same_folder

@@ -9,9 +9,8 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from kinertia.cli.findings_view import show_all
-from kinertia.cli.options import Outcome, Quiet, own_file
-from kinertia.cli.terminal import out, plain_table, shown_progress
+from kinertia.cli.common import Outcome, Quiet, out, own_file, plain_table, shown_progress
+from kinertia.cli.findings import show_all
 from kinertia.cohort.tables import fitted_people
 from kinertia.errors import FileError, KinertiaError, PriorError, SessionError
 from kinertia.estimation.identifiability import evidence

@@ -7,11 +7,20 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from kinertia.cli.options import Outcome, Output, Overwrite, Quiet, add_command, results_folder
-from kinertia.cli.terminal import out, plain_table, shown_progress
+from kinertia.cli.common import (
+    Outcome,
+    Output,
+    Overwrite,
+    Quiet,
+    add_command,
+    out,
+    plain_table,
+    results_folder,
+    shown_progress,
+)
 from kinertia.io.subject.reader import read_subject
 from kinertia.report.figures.plots import HOW, has_matplotlib
-from kinertia.report.pages.plan_page import (
+from kinertia.report.pages.study_pages import (
     CROSSVAL_HEADINGS,
     PLAN_CAPTION,
     PLAN_HEADINGS,
@@ -22,8 +31,9 @@ from kinertia.report.pages.plan_page import (
     plan_summary,
     save_crossval,
     save_plan,
+    save_sensitivity,
+    sensitivity_summary,
 )
-from kinertia.report.pages.sensitivity import save_sensitivity, sensitivity_summary
 from kinertia.report.pages.table1 import HEADINGS as VARIANT_HEADINGS
 from kinertia.report.pages.table1 import (
     save_table1,

@@ -1,7 +1,6 @@
 """Defines `kinertia warm-up`: compiles beforehand what the first fit would compile."""
 
-from kinertia.cli.options import Outcome, Quiet
-from kinertia.cli.terminal import out, shown_progress
+from kinertia.cli.common import Outcome, Quiet, out, shown_progress
 from kinertia.model.compiled import cache_folder, is_compiled
 
 

@@ -1,1 +1,1 @@
-"""Finds what is wrong with recordings, persons, models and results: one module per check."""
+"""Finds what is wrong with recordings, persons, models and results: one module per subject of checks."""

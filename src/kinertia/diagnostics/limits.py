@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import cache
 from typing import Any
 
-from kinertia.diagnostics.labels.swapped_markers import LOST_M
+from kinertia.diagnostics.markers.swapped_markers import LOST_M
 from kinertia.diagnostics.model.model_on_person import AT_LIMIT, BEYOND_RAD, CLAMPED, MOVED_M
 from kinertia.diagnostics.registry import MOTION_CHECKS, PERSON_CHECKS, STATIC_CHECKS
 from kinertia.diagnostics.result.corrections import APART_SD

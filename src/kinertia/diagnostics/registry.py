@@ -4,10 +4,10 @@ Their order follows from what they need (`runner.in_order`). Checks of a result 
 """
 
 from kinertia.diagnostics.context import PersonContext, RecordingContext
-from kinertia.diagnostics.labels.anatomy import anatomy, direction_of_travel, heading
-from kinertia.diagnostics.labels.marker_set import labels_match, landmarks
-from kinertia.diagnostics.labels.swapped_markers import label_swaps, rigidity
 from kinertia.diagnostics.markers.axes_and_floor import floor, floor_slope, unit_and_vertical
+from kinertia.diagnostics.markers.label_anatomy import anatomy, direction_of_travel, heading
+from kinertia.diagnostics.markers.marker_set import labels_match, landmarks
+from kinertia.diagnostics.markers.swapped_markers import label_swaps, rigidity
 from kinertia.diagnostics.markers.trajectories import absent_markers, over_smoothed, precision, trajectories, visible
 from kinertia.diagnostics.markers.unmeasured_data import computed_markers, frames
 from kinertia.diagnostics.model.geometry import length_unit, mirrored_joints, subtalar_axis
@@ -27,6 +27,7 @@ from kinertia.diagnostics.model.mass_properties import (
 from kinertia.diagnostics.model.model_on_person import markers_and_feet, model_and_trials, unmatched_markers
 from kinertia.diagnostics.plates.cop_positions import cop_on_plate, cop_progression, loads_and_feet
 from kinertia.diagnostics.plates.force_directions import axes_and_units, force_directions, vertical_signs
+from kinertia.diagnostics.plates.force_timing import belt_speed, file_events, force_rate, plate_delay, trial_delays
 from kinertia.diagnostics.plates.free_moments import free_moments, vertical_moment
 from kinertia.diagnostics.plates.gains import gains
 from kinertia.diagnostics.plates.ground_contact import (
@@ -53,7 +54,6 @@ from kinertia.diagnostics.subject.mass import masses_of_trials, stated_mass
 from kinertia.diagnostics.subject.movements import flat_feet, informative_movements, no_static, standing
 from kinertia.diagnostics.subject.same_person import repeated_trials, static_and_trials, trials_of_one_person
 from kinertia.diagnostics.subject.same_session import interchanged_forces, trial_scales
-from kinertia.diagnostics.timing.force_timing import belt_speed, file_events, force_rate, plate_delay, trial_delays
 
 MARKER_STATIC_CHECKS: tuple[Check[RecordingContext], ...] = (
     visible,

@@ -49,8 +49,8 @@ SOURCES = (
     "estimation/simultaneous/terms/root_equations.py",
     "estimation/simultaneous/terms/root_terms.py",
     "estimation/simultaneous/linear_algebra/normal_equations.py",
-    "estimation/simultaneous/markers/visible_markers.py",
-    "estimation/simultaneous/markers/visible_markers.py",
+    "estimation/simultaneous/markers/marker_errors.py",
+    "estimation/simultaneous/markers/marker_errors.py",
     "estimation/simultaneous/terms/marker_terms.py",
 )
 """Files of the package with compiled functions, which call one another."""

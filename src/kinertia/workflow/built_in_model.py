@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from kinertia.diagnostics.labels.swapped_markers import labels_by_model
+from kinertia.diagnostics.markers.swapped_markers import labels_by_model
 from kinertia.diagnostics.result.residuals import TORSO_RAD
 from kinertia.diagnostics.runner import blocking
 from kinertia.diagnostics.subject.body_data import unobserved_segments

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Self
 
 from kinertia.diagnostics.context import PersonContext, RecordingContext
-from kinertia.diagnostics.labels.marker_set import MarkerSetMatch, match_labels
+from kinertia.diagnostics.markers.marker_set import MarkerSetMatch, match_labels
 from kinertia.diagnostics.model.model_check import ModelCheck, check_model
 from kinertia.diagnostics.plates.ground_contact import PlateCheck, check_plates, coverage_of
 from kinertia.diagnostics.registry import MODEL_CHECKS

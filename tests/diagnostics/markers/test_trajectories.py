@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.labels.swapped_markers import label_swaps
+from kinertia.diagnostics.markers.swapped_markers import label_swaps
 from kinertia.diagnostics.markers.trajectories import trajectories
 from kinertia.diagnostics.markers.unmeasured_data import frames
 from kinertia.findings.finding import Severity

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from kinertia.diagnostics.context import PersonContext, RecordingContext
-from kinertia.diagnostics.labels.marker_set import landmarks
 from kinertia.diagnostics.markers.axes_and_floor import floor
+from kinertia.diagnostics.markers.marker_set import landmarks
 from kinertia.diagnostics.registry import SUBJECT_STATIC_CHECKS
 from kinertia.diagnostics.runner import asked
 from kinertia.diagnostics.subject.body_data import stature

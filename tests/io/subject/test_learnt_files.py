@@ -6,7 +6,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from kinertia.cli.options import own_file
+from kinertia.cli.common import own_file
 from kinertia.errors import FileError
 from kinertia.io.subject.learnt_files import (
     PersonInstruments,

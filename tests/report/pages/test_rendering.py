@@ -5,8 +5,9 @@ import json
 import plotly.graph_objects as go
 import pytest
 
-from kinertia.cli.terminal import print_json
-from kinertia.report.pages.plan_page import (
+from kinertia.cli.common import print_json
+from kinertia.report.pages.rendering import Part, render_parts
+from kinertia.report.pages.study_pages import (
     crossval_rows,
     crossval_sentence,
     crossval_summary,
@@ -15,7 +16,6 @@ from kinertia.report.pages.plan_page import (
     render_plan,
     save_plan,
 )
-from kinertia.report.pages.rendering import Part, render_parts
 from report_page import figures_of
 from study_results import HELD_OUT, PLAN
 

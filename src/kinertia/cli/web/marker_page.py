@@ -16,7 +16,7 @@ from kinertia.cli.web.entries import entries, trouble, write
 from kinertia.cli.web.jobs import Jobs
 from kinertia.cli.web.library import Library, PersonFolder
 from kinertia.cli.web.responses import expect, form, page, to
-from kinertia.diagnostics.labels.marker_set import match_labels
+from kinertia.diagnostics.markers.marker_set import match_labels
 from kinertia.errors import FileError, KinertiaError, SettingsError
 from kinertia.io.marker_set_draft import marker_set_text, places_of
 from kinertia.io.marker_set_file import preset_names, read_marker_set

@@ -1,1 +1,1 @@
-"""Findings about markers: trajectories, frames, precision, axes and floor."""
+"""Findings about markers (M) and their labels (L): trajectories, frames, axes and floor, marker set, swapped labels."""

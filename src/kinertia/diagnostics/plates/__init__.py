@@ -1,1 +1,1 @@
-"""Findings about force plates: signals, zeros, gains, directions, centres of pressure, contact."""
+"""Findings about force plates (P) and timing (T): signals, zeros, gains, directions, positions, contact, delays."""

@@ -32,9 +32,7 @@ from kinertia.diagnostics.evidence.plate_contacts import (
     cop_horizontal,
     displaced,
 )
-from kinertia.diagnostics.plates.plate_positions import WRONG_M, interchanged_plates, rotated_plates
-from kinertia.diagnostics.runner import check
-from kinertia.diagnostics.timing.contact_delays import (
+from kinertia.diagnostics.plates.contact_delays import (
     DELAY_S,
     LEAST_RATE_ERROR,
     LONGEST_DELAY_S,
@@ -43,6 +41,8 @@ from kinertia.diagnostics.timing.contact_delays import (
     fitted_rate_or_delay,
     stance_durations,
 )
+from kinertia.diagnostics.plates.plate_positions import WRONG_M, interchanged_plates, rotated_plates
+from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Limit, Quantity
 from kinertia.findings.rule import rule

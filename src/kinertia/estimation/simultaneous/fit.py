@@ -19,8 +19,8 @@ from kinertia.estimation.simultaneous.linear_algebra.motion_basis import Bandwid
 from kinertia.estimation.simultaneous.markers.marker_noise import MarkerNoise
 from kinertia.estimation.simultaneous.observation import CalibrationPrior, Observation, Observations, observe, reading
 from kinertia.estimation.simultaneous.outcome import SimultaneousResult
+from kinertia.estimation.simultaneous.search.problem import TERMS
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
-from kinertia.estimation.simultaneous.terms.all_terms import TERMS
 from kinertia.estimation.simultaneous.terms.cost_term import CostTerm
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.uncertainty.evidence import FreeMomentSign, MissingLoad

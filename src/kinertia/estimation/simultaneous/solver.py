@@ -27,8 +27,7 @@ from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.observation import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.outcome import Ended, SimultaneousResult, result_of
 from kinertia.estimation.simultaneous.search.gauss_newton import AdaptedPrior, GaussNewton, MotionAlone, SecantPairs
-from kinertia.estimation.simultaneous.search.problem import Linearised, MapProblem, Point, Slope
-from kinertia.estimation.simultaneous.terms.all_terms import TERMS
+from kinertia.estimation.simultaneous.search.problem import TERMS, Linearised, MapProblem, Point, Slope
 from kinertia.estimation.simultaneous.terms.cost_term import CostTerm
 from kinertia.estimation.simultaneous.terms.model_terms import as_displaced
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations, curve_deviations

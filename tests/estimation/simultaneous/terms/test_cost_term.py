@@ -9,9 +9,8 @@ from examples import ROOT, blocks
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
 from kinertia.estimation.simultaneous.observation import CalibrationPrior, Observation
-from kinertia.estimation.simultaneous.search.problem import MapProblem, Point
+from kinertia.estimation.simultaneous.search.problem import TERMS, MapProblem, Point
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
-from kinertia.estimation.simultaneous.terms.all_terms import TERMS
 from kinertia.estimation.simultaneous.terms.cost_term import in_order
 from kinertia.estimation.simultaneous.terms.instrument_term import InstrumentErrors
 from kinertia.motion.smoothing import smooth

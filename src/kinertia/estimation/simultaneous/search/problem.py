@@ -24,11 +24,38 @@ from kinertia.estimation.simultaneous.linear_algebra.frame_blocks import (
 from kinertia.estimation.simultaneous.linear_algebra.normal_equations import EquationsPool, Gradient, NormalEquations
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.observation import CalibrationPrior, Observation
-from kinertia.estimation.simultaneous.terms.all_terms import TERMS
 from kinertia.estimation.simultaneous.terms.cost_term import CostTerm, GroundLoads, InTrial, Solution, in_order
+from kinertia.estimation.simultaneous.terms.instrument_term import InstrumentErrors, MissingLoads
+from kinertia.estimation.simultaneous.terms.marker_terms import Markers
+from kinertia.estimation.simultaneous.terms.model_terms import (
+    BodySegments,
+    MarkerPositions,
+    Skin,
+    StaticCoordinates,
+    TaskMasses,
+)
+from kinertia.estimation.simultaneous.terms.motion_terms import JointRanges, Start
+from kinertia.estimation.simultaneous.terms.root_loads import RootLoads, TrunkBending
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.workload import side_by_side
 
+TERMS: tuple[type[CostTerm], ...] = (
+    StaticCoordinates,
+    InstrumentErrors,
+    MissingLoads,
+    TrunkBending,
+    MarkerPositions,
+    Skin,
+    BodySegments,
+    TaskMasses,
+    Markers,
+    JointRanges,
+    Start,
+    RootLoads,
+)
+"""Sorted by their `order`. The last takes about as long as all others together, so that two threads can share the work
+of short trials.
+"""
 T = TypeVar("T", bound=CostTerm)
 
 

@@ -22,8 +22,8 @@ from kinertia.estimation.simultaneous.linear_algebra.normal_equations import (
     to_border,
     to_splines,
 )
-from kinertia.estimation.simultaneous.markers.marker_errors import LATER
-from kinertia.estimation.simultaneous.markers.visible_markers import (
+from kinertia.estimation.simultaneous.markers.marker_errors import (
+    LATER,
     PlacedMarkers,
     SeenMarkers,
     add_gradient,

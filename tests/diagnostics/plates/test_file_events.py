@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kinertia.diagnostics.evidence.foot_trajectories import foot_trajectories
-from kinertia.diagnostics.timing.force_timing import file_events
+from kinertia.diagnostics.plates.force_timing import file_events
 from kinertia.findings.quantity import Where
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.data import FEET, FootLoads, Trial

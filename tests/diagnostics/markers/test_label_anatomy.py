@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.labels.anatomy import anatomy, direction_of_travel, heading
 from kinertia.diagnostics.markers.axes_and_floor import unit_and_vertical
+from kinertia.diagnostics.markers.label_anatomy import anatomy, direction_of_travel, heading
 from kinertia.findings.finding import Severity
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.trial.data import Markers

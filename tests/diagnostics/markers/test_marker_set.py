@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.labels.marker_set import labels_match, landmarks
+from kinertia.diagnostics.markers.marker_set import labels_match, landmarks
 from kinertia.findings.finding import Severity
 from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
 from kinertia.model.marker_set import MarkerSet

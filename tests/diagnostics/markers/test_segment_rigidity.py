@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.labels.swapped_markers import rigidity
+from kinertia.diagnostics.markers.swapped_markers import rigidity
 from kinertia.findings.finding import Severity
 from marker_contexts import changed, codes, context_of, relabelled
 from recordings import here, marker_set_for

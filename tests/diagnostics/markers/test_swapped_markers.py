@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from generic_static import generic_model, smooth_motion
-from kinertia.diagnostics.labels.swapped_markers import labels_by_model
+from kinertia.diagnostics.markers.swapped_markers import labels_by_model
 from kinertia.findings.finding import Severity
 from kinertia.model.gait27 import build_gait27
 from kinertia.trial.data import Markers, Recording

@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.timing.force_timing import TrialDelay, plate_delay, trial_delay, trial_delays, uneven_delays
+from kinertia.diagnostics.plates.force_timing import TrialDelay, plate_delay, trial_delay, trial_delays, uneven_delays
 from plate_findings import context_of
 from recordings import WALKS
 from trials_of_people import PEOPLE, Trials

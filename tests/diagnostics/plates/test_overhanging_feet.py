@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from kinertia.diagnostics.evidence.ambiguous_loads import Overhang
-from kinertia.diagnostics.timing.contact_delays import fitted_rate_or_delay
-from kinertia.diagnostics.timing.force_timing import force_rate
+from kinertia.diagnostics.plates.contact_delays import fitted_rate_or_delay
+from kinertia.diagnostics.plates.force_timing import force_rate
 from kinertia.trial.sampled_data import within
 from loads_and_feet import context_of
 from recordings import here

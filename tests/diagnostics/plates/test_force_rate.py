@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.timing.force_timing import force_rate
+from kinertia.diagnostics.plates.force_timing import force_rate
 from kinertia.findings.finding import Severity
 from kinertia.trial.data import Markers
 from plate_findings import context_of

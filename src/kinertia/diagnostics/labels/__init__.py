@@ -1,1 +1,0 @@
-"""Findings about labels: left and right, front and back, swapped markers, rigid segments."""

@@ -1,1 +1,0 @@
-"""Findings about time: sampling rates and synchronisation of forces and markers."""
