@@ -13,7 +13,14 @@ from kinertia.diagnostics.result import plate_errors, residuals, soundness
 from kinertia.diagnostics.result.corrections import delays, session_contradictions, zero_offsets
 from kinertia.diagnostics.result.residuals import moved_markers, residuals_of
 from kinertia.estimation.prepare.prepared import TotalMass
-from kinertia.estimation.simultaneous.calibration_entry import DELAY, FREE_MOMENT, GAIN, POSITION, ROTATION, ZERO
+from kinertia.estimation.simultaneous.instruments.instrument_errors import (
+    DELAY,
+    FREE_MOMENT,
+    GAIN,
+    POSITION,
+    ROTATION,
+    ZERO,
+)
 from kinertia.estimation.simultaneous.instruments.priors import (
     DELAY_PRIOR_S,
     FLOOR_PRIOR,

@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from generic_static import smooth_motion
 from kinertia.estimation.prior import BspPrior, literature_prior
-from kinertia.estimation.simultaneous.calibration_entry import BENDING
 from kinertia.estimation.simultaneous.inputs import PLACES, SKIN, STILL
+from kinertia.estimation.simultaneous.instruments.instrument_errors import BENDING
 from kinertia.estimation.simultaneous.instruments.plates import PLATE_UNKNOWNS, FootPlates, plate_middles
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
 from kinertia.estimation.simultaneous.markers.marker_errors import ErrorProcess

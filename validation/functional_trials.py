@@ -11,7 +11,7 @@ import typer
 
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.result.fit import Fit
-from kinertia.estimation.simultaneous.calibration_entry import AXIS, CalibrationEntry
+from kinertia.estimation.simultaneous.instruments.instrument_errors import AXIS, CalibrationEntry
 from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.settings import Settings, Subject
 from kinertia.studies.parallel import in_parallel

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import chi2
 
-from kinertia.estimation.simultaneous.calibration_entry import ZERO, CalibrationEntry
+from kinertia.estimation.simultaneous.instruments.instrument_errors import ZERO, CalibrationEntry
 
 APART = 1.96
 """SDs beyond which two values, or a value and zero, differ (95 %)."""

@@ -19,7 +19,7 @@ from typing import Annotated
 
 import typer
 
-from kinertia.estimation.simultaneous.calibration_entry import SHOWN_UNIT
+from kinertia.estimation.simultaneous.instruments.instrument_errors import SHOWN_UNIT
 from validation.measured_data import data_folder
 from validation.measured_trials import table
 from validation.page import write_page

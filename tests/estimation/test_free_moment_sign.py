@@ -12,8 +12,12 @@ from kinertia.estimation.free_moment_sign import (
     residual_moments_without_offsets_nm,
     with_undisputed_plates,
 )
-from kinertia.estimation.simultaneous.calibration_entry import POSITION, CalibrationEntry
-from kinertia.estimation.simultaneous.instruments.instrument_errors import ANOTHER_TRIAL, OTHER_SIGN
+from kinertia.estimation.simultaneous.instruments.instrument_errors import (
+    ANOTHER_TRIAL,
+    OTHER_SIGN,
+    POSITION,
+    CalibrationEntry,
+)
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
 from kinertia.motion.dynamics import residual
 from kinertia.trial.ground_contact import held_centre_of_pressure

@@ -13,8 +13,8 @@ from command_line import fitted
 from kinertia.estimation import free_moment_sign
 from kinertia.estimation.free_moment_sign import with_likelier_sign
 from kinertia.estimation.prior import literature_prior
-from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
 from kinertia.estimation.simultaneous.fit import fit_simultaneous
+from kinertia.estimation.simultaneous.instruments.instrument_errors import CalibrationEntry
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
 from kinertia.estimation.simultaneous.uncertainty.evidence import Evidence, FreeMomentSign
 from kinertia.model.bsp import BodySegmentParameters

@@ -5,7 +5,7 @@ from dataclasses import asdict
 
 import pytest
 
-from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
+from kinertia.estimation.simultaneous.instruments.instrument_errors import CalibrationEntry
 from validation import sessions
 from validation.repeatability import Estimate, Shared, group_sums, shared, weighted_mean
 

@@ -10,7 +10,7 @@ import pytest
 from kinertia import Settings, Subject, TrialInput, estimate, prepare, prepare_subject
 from kinertia.errors import BlockedError, SettingsError
 from kinertia.estimation.result.drawn_fit import kept_draws
-from kinertia.estimation.simultaneous.calibration_entry import AXIS
+from kinertia.estimation.simultaneous.instruments.instrument_errors import AXIS
 from kinertia.io.text.trc import write_trc
 from kinertia.model.gait27 import LEG_AXIS_TILTS
 from kinertia.report.exports.files import write_draws

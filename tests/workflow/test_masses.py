@@ -9,8 +9,8 @@ from pydantic import ValidationError
 from kinertia.errors import BlockedError, PriorError, SettingsError
 from kinertia.estimation.prepare.prepared import Prepared, TotalMass
 from kinertia.estimation.prior import literature_prior
-from kinertia.estimation.simultaneous.calibration_entry import GAIN, CalibrationEntry
 from kinertia.estimation.simultaneous.fit import calibration_prior
+from kinertia.estimation.simultaneous.instruments.instrument_errors import GAIN, CalibrationEntry
 from kinertia.estimation.simultaneous.instruments.priors import GAIT27_UNCERTAINTY
 from kinertia.estimation.simultaneous.linear_algebra.motion_basis import Bandwidth
 from kinertia.estimation.simultaneous.observation import observe

@@ -11,8 +11,7 @@ from kinertia.io.opensim.reader import read_osim
 from kinertia.io.opensim.writer import export_osim
 from kinertia.io.text.trc import read_trc
 from kinertia.model.bsp import BodySegmentParameters
-from kinertia.model.imported_model import OsimModel
-from kinertia.model.neutral_joints import centre_offsets
+from kinertia.model.imported_model import OsimModel, centre_offsets
 from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.settings import Subject
 from kinertia.trial.trial_input import TrialInput

@@ -17,7 +17,7 @@ from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.learnt_prior import LearntPrior, PersonInformation, information_of, learn
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.mean_cycles import Control, band_columns, mixture
-from kinertia.estimation.simultaneous.calibration_entry import SHOWN_UNIT
+from kinertia.estimation.simultaneous.instruments.instrument_errors import SHOWN_UNIT
 from kinertia.io.norms_file import read_norms
 from kinertia.io.recording import MARKER_FILES
 from kinertia.io.results.output_folder import write_then_rename

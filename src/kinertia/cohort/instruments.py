@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.calibration_entry import GAIN, SHOWN_UNIT, item_text, quantity_text
+from kinertia.estimation.simultaneous.instruments.instrument_errors import GAIN, SHOWN_UNIT, item_text, quantity_text
 from kinertia.report.figures import style
 from kinertia.report.figures.figure import Panel, plain, small_multiples
 from kinertia.report.pages.rendering import Part

@@ -24,7 +24,7 @@ from kinertia.estimation.result.cycles import UNITS, cycle_columns
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.gait_scores import OVERALL
 from kinertia.estimation.result.mean_cycles import gait_profile
-from kinertia.estimation.simultaneous.calibration_entry import calibration_columns
+from kinertia.estimation.simultaneous.instruments.instrument_errors import calibration_columns
 from kinertia.findings.finding import Severity
 from kinertia.findings.overview import Overview, finding_columns
 from kinertia.io.norms_file import Norm

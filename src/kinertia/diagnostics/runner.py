@@ -19,6 +19,20 @@ from kinertia.settings import Overrule
 
 Context = TypeVar("Context")
 
+# what checks need, by the codes whose ERROR says that it is not there: without it a check means nothing
+NEEDS_LENGTH_UNIT = ("M141",)
+"""In another unit of length no limit in metres means anything."""
+NEEDS_AXES = ("M141", "M142")
+"""Without a vertical and a unit of length, nothing is above or beside anything."""
+NEEDS_MEASURED_FRAMES = ("M123",)
+"""Where frames were interpolated, steps from frame to frame mean nothing."""
+NEEDS_VERTICAL_FORCE = ("P201",)
+"""In other axes there is no vertical force to judge by."""
+NEEDS_LOADS_UNDER_FEET = ("P201", "P202", "P203", "P204", "P24", "T20", "T21")
+"""Else it is not known where on a foot a load acts."""
+NEEDS_VELOCITY = ("L20", "M12", "M14", "P10", "P11", "P20", "P24", "T201", "T211", "T212")
+"""Else markers, forces or their times do not belong to one moving body."""
+
 
 @dataclass(frozen=True, eq=False)
 class Check(Generic[Context]):

@@ -21,9 +21,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinertia.estimation.prepare.prepared import Prepared
-from kinertia.estimation.simultaneous.calibration_entry import POSITION, CalibrationEntry
 from kinertia.estimation.simultaneous.fit import SimultaneousFit, compared_with
-from kinertia.estimation.simultaneous.instruments.instrument_errors import OTHER_SIGN
+from kinertia.estimation.simultaneous.instruments.instrument_errors import OTHER_SIGN, POSITION, CalibrationEntry
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
 from kinertia.estimation.simultaneous.mixture_prior import FaultMixture
 from kinertia.estimation.simultaneous.uncertainty.evidence import FreeMomentSign

@@ -50,7 +50,7 @@ from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Skeleton
 from kinertia.model.upper_body import ARM_SEGMENTS, without_head
 from kinertia.motion.kinematics import facing
-from kinertia.motion.stance_pose import hidden_landmarks, stance_pose
+from kinertia.motion.pose_fit import hidden_landmarks, stance_pose
 from kinertia.motion.workload import one_blas_thread
 from kinertia.settings import Settings
 from kinertia.trial.data import Recording, Trial

@@ -15,8 +15,8 @@ from kinertia.estimation.prepare.prepared import Prepared, Progress
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.trial_fit import JointCurves, TrialFit
-from kinertia.estimation.simultaneous.calibration_entry import GAIN
 from kinertia.estimation.simultaneous.fit import Posterior, SimultaneousFit, fit_simultaneous
+from kinertia.estimation.simultaneous.instruments.instrument_errors import GAIN
 from kinertia.estimation.simultaneous.instruments.priors import ModelUncertainty
 from kinertia.estimation.simultaneous.linear_algebra.motion_basis import Bandwidth
 from kinertia.estimation.simultaneous.terms.cost_term import CostTerm

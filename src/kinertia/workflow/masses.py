@@ -18,8 +18,8 @@ import numpy as np
 from kinertia.errors import PriorError
 from kinertia.estimation.prepare.prepared import Prepared, known, mass_of
 from kinertia.estimation.prior import SECOND_MOMENT_SD, BspPrior, inertia_covariance
-from kinertia.estimation.simultaneous.calibration_entry import GAIN, CalibrationEntry
 from kinertia.estimation.simultaneous.fit import SimultaneousFit
+from kinertia.estimation.simultaneous.instruments.instrument_errors import GAIN, CalibrationEntry
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity, Where
 from kinertia.model.bsp import BodySegmentParameters

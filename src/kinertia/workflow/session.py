@@ -9,8 +9,12 @@ from kinertia.diagnostics.result.corrections import session_contradictions
 from kinertia.errors import SessionError
 from kinertia.estimation.prepare.prepared import Prepared
 from kinertia.estimation.result.fit import Fit
-from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry, item_text, quantity_text
-from kinertia.estimation.simultaneous.instruments.instrument_errors import laboratory_errors
+from kinertia.estimation.simultaneous.instruments.instrument_errors import (
+    CalibrationEntry,
+    item_text,
+    laboratory_errors,
+    quantity_text,
+)
 from kinertia.estimation.simultaneous.instruments.plates import PLATE_ERRORS, plates_with_floor
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentInformation, InstrumentPrior
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior

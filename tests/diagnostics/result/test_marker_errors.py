@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kinertia.diagnostics.result.residuals import corrected_joints, moved_markers, sideways_lean
-from kinertia.estimation.simultaneous.calibration_entry import AXIS, CalibrationEntry
+from kinertia.estimation.simultaneous.instruments.instrument_errors import AXIS, CalibrationEntry
 from kinertia.estimation.simultaneous.markers.marker_noise import MarkerNoise
 from kinertia.synthetic.walk import walking_subject
 from kinertia.trial.data import FootLoads, Markers

@@ -7,7 +7,7 @@ import pytest
 
 from kinertia.errors import KinertiaError
 from kinertia.estimation.result.drawn_fit import _reactions, chosen_draws, drawn_fit, kept_draws
-from kinertia.estimation.simultaneous.calibration_entry import GAIN as GAIN_OF_PLATE
+from kinertia.estimation.simultaneous.instruments.instrument_errors import GAIN as GAIN_OF_PLATE
 from kinertia.estimation.simultaneous.instruments.plates import GAIN, corrected_loads
 from kinertia.estimation.simultaneous.linear_algebra.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.uncertainty import posterior_draws

@@ -7,7 +7,7 @@ import pytest
 
 from c3d_writer import plate_parameters, write_c3d
 from kinertia.errors import FileError
-from kinertia.io.c3d.events import EventToWrite
+from kinertia.io.c3d.file_contents import EventToWrite
 from kinertia.io.c3d.outputs import Measure, OutputPoint, frames_of, with_outputs
 from kinertia.io.c3d.parameters import ParameterSection
 from kinertia.io.c3d.reader import read_c3d

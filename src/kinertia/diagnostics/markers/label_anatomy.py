@@ -10,10 +10,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.landmarks import CLEAR, cosine, horizontal, most_forwards, unit
-from kinertia.diagnostics.runner import check
+from kinertia.diagnostics.runner import NEEDS_AXES, check
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Limit, Quantity
 from kinertia.model.marker_set import MarkerSet, in_words
@@ -58,7 +57,7 @@ class _Body:
         return with_evidence(code, self.context.at(markers=tuple(dict.fromkeys(labels))), evidence)
 
 
-@check("L201", "L202", "L203", "L205", "L206", "L207", "L208", unless=needs.AXES, behind=_BEHIND, beyond=_BEYOND)
+@check("L201", "L202", "L203", "L205", "L206", "L207", "L208", unless=NEEDS_AXES, behind=_BEHIND, beyond=_BEYOND)
 def anatomy(context: RecordingContext) -> Iterator[Finding]:
     """Report L201 to L208: labels that contradict a person's anatomy, of a person upright, standing or moving, with Y
     up."""
@@ -312,7 +311,7 @@ def heading(context: RecordingContext) -> Iterator[Finding]:
     )
 
 
-@check("S311", unless=(*needs.AXES, "L20"))
+@check("S311", unless=(*NEEDS_AXES, "L20"))
 def direction_of_travel(context: RecordingContext) -> Iterator[Finding]:
     """Report S311: the person walks where neither feet nor pelvis point.
 

@@ -17,10 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.trajectory_faults import step_limit_m, steps
-from kinertia.diagnostics.runner import check
+from kinertia.diagnostics.runner import NEEDS_LENGTH_UNIT, NEEDS_MEASURED_FRAMES, check
 from kinertia.estimation.prepare.calibration import sampled
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Limit, Quantity, Where
@@ -76,7 +75,7 @@ class _Pair(NamedTuple):
     limit_m: float
 
 
-@check("L213", "L214", unless=needs.LENGTH_UNIT, segment=_SEGMENT_M, joint=_JOINT_M)
+@check("L213", "L214", unless=NEEDS_LENGTH_UNIT, segment=_SEGMENT_M, joint=_JOINT_M)
 def rigidity(context: RecordingContext) -> Iterator[Finding]:
     """Report L213, one per marker that does not move with its segment; L214, one per segment on the wrong leg.
 
@@ -314,7 +313,7 @@ def _typical(errors: np.ndarray) -> np.ndarray:
     return np.where(seen, np.nanmedian(np.where(seen[..., None, :], errors, 0.0), axis=-2), 0.0)
 
 
-@check("L211", unless=needs.LENGTH_UNIT + needs.MEASURED_FRAMES)
+@check("L211", unless=NEEDS_LENGTH_UNIT + NEEDS_MEASURED_FRAMES)
 def label_swaps(context: RecordingContext) -> Iterator[Finding]:
     """Report L211: one finding per swap; where labels return to their own markers there is another."""
     markers = context.measured_markers

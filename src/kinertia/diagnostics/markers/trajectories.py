@@ -11,7 +11,6 @@ from itertools import combinations
 
 import numpy as np
 
-from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import PersonContext, RecordingContext
 from kinertia.diagnostics.evidence.landmarks import bridged_trajectory
 from kinertia.diagnostics.evidence.marker_precision import COARSE_M, NOISY_M
@@ -26,7 +25,7 @@ from kinertia.diagnostics.evidence.trajectory_faults import (
     spike_limit_m,
     step_limit_m,
 )
-from kinertia.diagnostics.runner import check
+from kinertia.diagnostics.runner import NEEDS_LENGTH_UNIT, NEEDS_MEASURED_FRAMES, NEEDS_VELOCITY, check
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.model.marker_set import in_words
@@ -57,7 +56,7 @@ _MOSTLY_SEEN = 0.9
     "M113",
     "M114",
     "M115",
-    unless=needs.LENGTH_UNIT + needs.MEASURED_FRAMES,
+    unless=NEEDS_LENGTH_UNIT + NEEDS_MEASURED_FRAMES,
     spike=SPIKE_M,
     brief=BRIEF_S,
     frames=MOST_SPIKES,
@@ -179,7 +178,7 @@ def absent_markers(context: PersonContext) -> Iterator[Finding]:
             yield finding("M105", Where(trial=trial.name, markers=absent), count=Quantity(len(absent), "1"))
 
 
-@check("M131", "M132", unless=needs.LENGTH_UNIT + needs.MEASURED_FRAMES, coarse=COARSE_M, noisy=NOISY_M)
+@check("M131", "M132", unless=NEEDS_LENGTH_UNIT + NEEDS_MEASURED_FRAMES, coarse=COARSE_M, noisy=NOISY_M)
 def precision(context: RecordingContext) -> Iterator[Finding]:
     """Report M131 and M132: coarsely rounded coordinates, and noisy ones."""
     precise = context.marker_precision
@@ -191,7 +190,7 @@ def precision(context: RecordingContext) -> Iterator[Finding]:
         yield finding("M132", context.at(), noise_m=noise)
 
 
-@check("M133", unless=needs.VELOCITY, quick=_QUICK_HZ, share=_LEAST_SHARE, certain=_CERTAIN_SHARE, ratio=_MOST_RATIO)
+@check("M133", unless=NEEDS_VELOCITY, quick=_QUICK_HZ, share=_LEAST_SHARE, certain=_CERTAIN_SHARE, ratio=_MOST_RATIO)
 def over_smoothed(context: RecordingContext) -> Iterator[Finding]:
     """Report M133: markers without the fast part of the motion that the forces show; no finding without steps."""
     trial, owners, changes = context.trial, context.segment_of_label, context.velocity_changes

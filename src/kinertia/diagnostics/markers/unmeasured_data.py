@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.trajectory_faults import (
     COPIED_SHARE,
@@ -26,7 +25,7 @@ from kinertia.diagnostics.evidence.trajectory_faults import (
     steps,
     without_copied_frames,
 )
-from kinertia.diagnostics.runner import check
+from kinertia.diagnostics.runner import NEEDS_LENGTH_UNIT, check
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.model.marker_set import MarkerSet
@@ -63,7 +62,7 @@ _JOINTS = ("knee", "ankle", "elbow")
     "M122",
     "M123",
     "M124",
-    unless=needs.LENGTH_UNIT,
+    unless=NEEDS_LENGTH_UNIT,
     step=_MISSING_M,
     times=_MISSING_TIMES,
     few=_FEW_COPIED,
@@ -183,7 +182,7 @@ class _Computed(NamedTuple):
     sd_m: float
 
 
-@check("M151", unless=needs.LENGTH_UNIT, exact=_EXACT_M)
+@check("M151", unless=NEEDS_LENGTH_UNIT, exact=_EXACT_M)
 def computed_markers(context: RecordingContext) -> Iterator[Finding]:
     """Report M151, one per point that was computed from other markers; of a motion."""
     if context.marker_set is not None:

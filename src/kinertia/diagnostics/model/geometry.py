@@ -19,7 +19,7 @@ from kinertia.diagnostics.runner import check
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.model.bsp import BodySegmentParameters, FloatArray
-from kinertia.model.neutral_joints import NeutralJoints, angle_deg, mirrored, neutral_joints
+from kinertia.model.imported_model import NeutralJoints, angle_deg, mirrored, neutral_joints
 from kinertia.model.skeleton import Skeleton
 
 _AXIS_RAD = Limit(np.radians(5.0), "rad", usual=(0.0, 0.0))

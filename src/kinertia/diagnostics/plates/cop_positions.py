@@ -19,7 +19,6 @@ from itertools import chain
 
 import numpy as np
 
-from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.ambiguous_loads import FOOT_ENDS, beyond_edges
 from kinertia.diagnostics.evidence.body_motion import LARGEST_RESIDUAL, vertical_match_of
@@ -42,7 +41,7 @@ from kinertia.diagnostics.plates.contact_delays import (
     stance_durations,
 )
 from kinertia.diagnostics.plates.plate_positions import WRONG_M, interchanged_plates, rotated_plates
-from kinertia.diagnostics.runner import check
+from kinertia.diagnostics.runner import NEEDS_LOADS_UNDER_FEET, check
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Limit, Quantity
 from kinertia.findings.rule import rule
@@ -244,7 +243,7 @@ def forces_keep_time(context: RecordingContext) -> bool:
     return bool(found) and max(abs(one.delay_s) for one in found) < _DELAY_S
 
 
-@check("P251", "P252", unless=needs.LOADS_UNDER_FEET, fixed=_FIXED_M, backwards=_BACKWARDS, forwards=_FORWARDS)
+@check("P251", "P252", unless=NEEDS_LOADS_UNDER_FEET, fixed=_FIXED_M, backwards=_BACKWARDS, forwards=_FORWARDS)
 def cop_progression(context: RecordingContext) -> Iterator[Finding]:
     """Report P251 and P252: plates whose centre of pressure never moves during a step (P251), or moves from toe to heel
     while on another plate it moves from heel to toe (P252).

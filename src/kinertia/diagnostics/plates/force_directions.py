@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.body_motion import (
     CLEARLY_BEST,
@@ -26,7 +25,7 @@ from kinertia.diagnostics.evidence.body_motion import (
     rotated_residual,
 )
 from kinertia.diagnostics.evidence.force_mass import loaded_wrenches
-from kinertia.diagnostics.runner import check
+from kinertia.diagnostics.runner import NEEDS_VELOCITY, NEEDS_VERTICAL_FORCE, check
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Limit, Quantity
 from kinertia.findings.rule import rule
@@ -65,7 +64,7 @@ class _Hypothesis:
     "P232",
     "P233",
     "P236",
-    unless=needs.VELOCITY,
+    unless=NEEDS_VELOCITY,
     opposed=_OPPOSED,
     moment=_MUCH_SMALLER,
     reversed_share=_ONE_REVERSED,
@@ -166,7 +165,7 @@ def _moment_reversed(plates: PlateLoads | None, axis: int) -> bool:
     return left_nm[1] < _MUCH_SMALLER * left_nm[0]
 
 
-@check("P238", unless=needs.VERTICAL_FORCE)
+@check("P238", unless=NEEDS_VERTICAL_FORCE)
 def vertical_signs(context: RecordingContext) -> Iterator[Finding]:
     """Report P238: a plate that was reversed when it was read, since its vertical force pointed down, unlike others',
     and that pushes first and brakes later since."""

@@ -22,7 +22,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import PersonContext, RecordingContext
 from kinertia.diagnostics.evidence.body_motion import (
     LARGEST_RESIDUAL,
@@ -31,7 +30,7 @@ from kinertia.diagnostics.evidence.body_motion import (
     vertical_match_of,
 )
 from kinertia.diagnostics.evidence.foot_trajectories import LEAST_BELT_M_S, standing_speeds
-from kinertia.diagnostics.runner import check
+from kinertia.diagnostics.runner import NEEDS_VELOCITY, check
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.trial.data import FEET, FloatArray, Trial
@@ -131,7 +130,7 @@ def uneven_delays(delays: Sequence[TrialDelay | None]) -> Iterator[Finding]:
         )
 
 
-@check("T216", unless=needs.VELOCITY, difference=_DIFFERENCE_S)
+@check("T216", unless=NEEDS_VELOCITY, difference=_DIFFERENCE_S)
 def plate_delay(context: RecordingContext) -> Iterator[Finding]:
     """Report T216: each plate with a delay of its own explains the vertical velocity, and neither one for all nor gains
     do."""
@@ -202,7 +201,7 @@ def _fitted(terms: FloatArray, wanted: FloatArray) -> tuple[FloatArray, float]:
     return factors, float(np.std(wanted - terms @ factors))
 
 
-@check("T201", "T202", unless=needs.VELOCITY, vertical_growth=_LEAST_GROWTH, least=_LEAST_RATIO, most=_MOST_RATIO)
+@check("T201", "T202", unless=NEEDS_VELOCITY, vertical_growth=_LEAST_GROWTH, least=_LEAST_RATIO, most=_MOST_RATIO)
 def force_rate(context: RecordingContext) -> Iterator[Finding]:
     """Report T202 and T201: a wrong rate by the velocity ratio (T202); delays that grow or shrink in a measured window
     (T201).

@@ -19,11 +19,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.foot_trajectories import periods
 from kinertia.diagnostics.evidence.force_mass import carrying, loaded_wrenches
-from kinertia.diagnostics.runner import check
+from kinertia.diagnostics.runner import NEEDS_VELOCITY, NEEDS_VERTICAL_FORCE, check
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Limit, Quantity
 from kinertia.findings.rule import rule
@@ -50,7 +49,7 @@ _FREE_SHARE = 0.5
 """Share of the mean vertical moment from which on the free moments under the feet are its likeliest cause."""
 
 
-@check("P261", "P262", "P263", "P264", unless=needs.VERTICAL_FORCE, lever_arm=_COLUMNS_ARM_M, absent=_ABSENT_NM)
+@check("P261", "P262", "P263", "P264", unless=NEEDS_VERTICAL_FORCE, lever_arm=_COLUMNS_ARM_M, absent=_ABSENT_NM)
 def free_moments(context: RecordingContext) -> Iterator[Finding]:
     """Report P261 to P264: free moments that contradict the forces of their plate."""
     plates = context.plates
@@ -176,7 +175,7 @@ class MeanVerticalMoment:
         return sum(self.free_nm) / self.moment_nm >= _FREE_SHARE
 
 
-@check("P266", unless=needs.VELOCITY, lever_arm=VERTICAL_MOMENT_LEVER_M)
+@check("P266", unless=NEEDS_VELOCITY, lever_arm=VERTICAL_MOMENT_LEVER_M)
 def vertical_moment(context: RecordingContext) -> Iterator[Finding]:
     """Report P266: a mean vertical moment about the middle of the pelvis markers, in the longest measured window; not
     in turns."""

@@ -9,7 +9,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.body_motion import (
     CLEARLY_BEST,
@@ -20,7 +19,7 @@ from kinertia.diagnostics.evidence.body_motion import (
     steady_scaled,
     vertical_match_of,
 )
-from kinertia.diagnostics.runner import check
+from kinertia.diagnostics.runner import NEEDS_VELOCITY, check
 from kinertia.findings.finding import Finding, with_evidence
 from kinertia.findings.quantity import Limit, Quantity
 from kinertia.trial.data import PlateLoads
@@ -39,7 +38,7 @@ are as large another gain leaves 0.72 and more, or another zero explains more. B
 @check(
     "P221",
     "P222",
-    unless=needs.VELOCITY,
+    unless=NEEDS_VELOCITY,
     difference=_DIFFERENCE,
     gain=_LEAST_GAIN,
     smaller=_FACTORS[0][0],

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import PersonContext, RecordingContext
 from kinertia.diagnostics.evidence.ambiguous_loads import (
     HALLUX_M,
@@ -15,7 +14,7 @@ from kinertia.diagnostics.evidence.ambiguous_loads import (
 )
 from kinertia.diagnostics.evidence.force_mass import FOREIGN_S, FOREIGN_SHARE, MOSTLY
 from kinertia.diagnostics.plates.cop_positions import off_plate
-from kinertia.diagnostics.runner import check
+from kinertia.diagnostics.runner import NEEDS_LOADS_UNDER_FEET, check
 from kinertia.diagnostics.subject.movements import task_of
 from kinertia.errors import KinertiaError
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
@@ -108,7 +107,7 @@ def _too_few_frames(context: RecordingContext) -> Finding | None:
     return None if frames >= fewest else finding("T104", context.at(), frames=Quantity(frames, "1", limit=fewest))
 
 
-@check("P276", unless=needs.LOADS_UNDER_FEET, outside=OUTSIDE_M, share=OTHERS_SHARE)
+@check("P276", unless=NEEDS_LOADS_UNDER_FEET, outside=OUTSIDE_M, share=OTHERS_SHARE)
 def both_feet(context: RecordingContext) -> Iterator[Finding]:
     """Report P276: a load between the feet; both are on the plate, and only their total load is known."""
     plates = context.plates
@@ -119,7 +118,7 @@ def both_feet(context: RecordingContext) -> Iterator[Finding]:
         yield finding("P276", where, share=Quantity(one.share, "1", limit=one.limit))
 
 
-@check("P282", unless=needs.LOADS_UNDER_FEET, overhang=OVERHANG_M, hallux=HALLUX_M, edge=NO_FOOT_M)
+@check("P282", unless=NEEDS_LOADS_UNDER_FEET, overhang=OVERHANG_M, hallux=HALLUX_M, edge=NO_FOOT_M)
 def plate_edges(context: RecordingContext) -> Iterator[Finding]:
     """Report P282: feet that extend beyond the plate that they stand on, onto the floor."""
     plates = context.plates

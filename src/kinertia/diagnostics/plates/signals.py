@@ -12,10 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.force_mass import ADULT_KG, STEP_N, carrying, loaded_wrenches, wrenches
-from kinertia.diagnostics.runner import check
+from kinertia.diagnostics.runner import NEEDS_VERTICAL_FORCE, check
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.motion.ground_reactions import load_bandwidth_hz
@@ -66,7 +65,7 @@ _SHORTEST_S, _SAMPLES_PER_PERIOD, _SLOW_ORDER = 0.2, 3.0, 6
     "P103",
     "P104",
     "P109",
-    unless=needs.VERTICAL_FORCE,
+    unless=NEEDS_VERTICAL_FORCE,
     dead=_DEAD_N,
     step=STEP_N,
     adult=ADULT_KG,
@@ -99,7 +98,7 @@ def _dead_channels(context: RecordingContext, plates: PlateLoads) -> Iterator[Fi
                 )
 
 
-@check("P111", unless=needs.VERTICAL_FORCE, dead=_DEAD_NM, step=STEP_N, adult=ADULT_KG)
+@check("P111", unless=NEEDS_VERTICAL_FORCE, dead=_DEAD_NM, step=STEP_N, adult=ADULT_KG)
 def dead_moments(context: RecordingContext) -> Iterator[Finding]:
     """Report P111: a horizontal axis about whose middle a plate that supports a person has no moment; readers add to
     that of its channel the horizontal force times the depth of the transducers."""
@@ -233,7 +232,7 @@ def _as_long(mask: BoolArray) -> int:
     return len(mask) if mask.all() else int(np.argmin(mask))
 
 
-@check("P105", "P106", unless=needs.VERTICAL_FORCE, force_step=_COARSE_N, cop_step=_COARSE_M)
+@check("P105", "P106", unless=NEEDS_VERTICAL_FORCE, force_step=_COARSE_N, cop_step=_COARSE_M)
 def quantisation(context: RecordingContext) -> Iterator[Finding]:
     """Report P105 and P106: forces, or centres of pressure, in coarse steps."""
     plates = context.plates
@@ -251,7 +250,7 @@ def quantisation(context: RecordingContext) -> Iterator[Finding]:
             yield finding("P106", context.at(plate=name), step_m=Quantity(step_m, "m", limit=_COARSE_M))
 
 
-@check("P108", unless=needs.VERTICAL_FORCE, cutoff=_FILTERED_HZ, overshoot=_OVERSHOOT_S)
+@check("P108", unless=NEEDS_VERTICAL_FORCE, cutoff=_FILTERED_HZ, overshoot=_OVERSHOOT_S)
 def low_passed(context: RecordingContext) -> Iterator[Finding]:
     """Report P108: forces spread in time by a filter, by its overshoot or by what contacts lack."""
     plates = context.plates
@@ -284,7 +283,7 @@ def _step(values: FloatArray, decimals: int) -> float:
     return step if np.abs(steps - np.round(steps)).max() < _OFF_STEP else 0.0
 
 
-@check("P107", unless=needs.VERTICAL_FORCE, amplitude=_HUM_N, times=_STANDS_OUT, loud=_LOUD_N)
+@check("P107", unless=NEEDS_VERTICAL_FORCE, amplitude=_HUM_N, times=_STANDS_OUT, loud=_LOUD_N)
 def mains_interference(context: RecordingContext) -> Iterator[Finding]:
     """Report P107: mains interference of every plate and axis, at the stronger of the two mains frequencies."""
     plates = context.plates

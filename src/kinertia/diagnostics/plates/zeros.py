@@ -10,11 +10,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from kinertia.diagnostics import needs
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.body_motion import CLEARLY_BEST, HORIZONTAL, ForceVelocity, VelocityResidual
 from kinertia.diagnostics.evidence.force_mass import ADULT_KG, STEP_N
-from kinertia.diagnostics.runner import check
+from kinertia.diagnostics.runner import NEEDS_VELOCITY, NEEDS_VERTICAL_FORCE, check
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Limit, Quantity
 from kinertia.findings.rule import rule
@@ -48,7 +47,7 @@ _AGREES = 0.5
     "P211",
     "P213",
     "P216",
-    unless=needs.VERTICAL_FORCE,
+    unless=NEEDS_VERTICAL_FORCE,
     drift=_DRIFT_N,
     zero=_ZERO_N,
     far=_FAR_FROM_ZERO_N,
@@ -131,7 +130,7 @@ def _steady_minimum(vertical: FloatArray, share: float) -> float | None:
     return None
 
 
-@check("P212", "P214", unless=needs.VELOCITY, of_one=_PLATE_ZERO_N, force=_FORCE_N, window=_WINDOW_S)
+@check("P212", "P214", unless=NEEDS_VELOCITY, of_one=_PLATE_ZERO_N, force=_FORCE_N, window=_WINDOW_S)
 def zeros_under_load(context: RecordingContext) -> Iterator[Finding]:
     """Report P212 and P214: zero offsets under load along each horizontal axis.
 

@@ -9,7 +9,7 @@ from kinertia.diagnostics.evidence.landmarks import owners_of
 from kinertia.diagnostics.marker_context import Axes
 from kinertia.estimation.prepare.prepared import Prepared
 from kinertia.estimation.result.fit import Fit
-from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
+from kinertia.estimation.simultaneous.instruments.instrument_errors import CalibrationEntry
 from kinertia.findings.quantity import Where
 from kinertia.motion.kinematics import Kinematics
 from kinertia.trial.marker_quality import travel

@@ -11,7 +11,7 @@ import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.runner import check
-from kinertia.estimation.simultaneous.calibration_entry import DELAY, NOTABLE, ZERO, CalibrationEntry
+from kinertia.estimation.simultaneous.instruments.instrument_errors import DELAY, NOTABLE, ZERO, CalibrationEntry
 from kinertia.estimation.simultaneous.instruments.priors import DELAY_PRIOR_S, TRIAL_DELAY_PRIOR_S, ZERO_PRIOR_N
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Limit, Quantity, Where

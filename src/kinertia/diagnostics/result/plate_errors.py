@@ -37,7 +37,13 @@ from kinertia.diagnostics.result.corrections import corrected, correction, equal
 from kinertia.diagnostics.runner import check
 from kinertia.estimation.free_moment_sign import VERTICAL, residual_moments_nm, residual_moments_without_offsets_nm
 from kinertia.estimation.result.trial_fit import TrialFit
-from kinertia.estimation.simultaneous.calibration_entry import FREE_MOMENT, GAIN, POSITION, ROTATION, CalibrationEntry
+from kinertia.estimation.simultaneous.instruments.instrument_errors import (
+    FREE_MOMENT,
+    GAIN,
+    POSITION,
+    ROTATION,
+    CalibrationEntry,
+)
 from kinertia.estimation.simultaneous.instruments.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS
 from kinertia.estimation.simultaneous.instruments.priors import (
     FLOOR_PRIOR,

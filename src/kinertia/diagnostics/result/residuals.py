@@ -31,13 +31,13 @@ from kinertia.diagnostics.result.corrections import equal, reported
 from kinertia.diagnostics.runner import check
 from kinertia.estimation.prepare.model_adaptation import BACKWARDS_RAD
 from kinertia.estimation.result.trial_fit import TrialFit
-from kinertia.estimation.simultaneous.calibration_entry import AXIS, POSITION, CalibrationEntry
+from kinertia.estimation.simultaneous.instruments.instrument_errors import AXIS, POSITION, CalibrationEntry
 from kinertia.estimation.simultaneous.instruments.priors import JOINT_AXIS_SD_RAD
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.model.anatomy import segment_of
 from kinertia.model.coordinate_range import TOLERANCE_DEG, UNKNOWN
-from kinertia.model.neutral_joints import centre_offsets
+from kinertia.model.imported_model import centre_offsets
 from kinertia.model.skeleton import Skeleton
 from kinertia.model.upper_body import head_markers
 from kinertia.trial.data import FEET

@@ -15,7 +15,7 @@ from kinertia.diagnostics.runner import check
 from kinertia.estimation.simultaneous.instruments.priors import JOINT_CENTRE_SD_M, WITHOUT_STATIC
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Limit, Quantity
-from kinertia.motion.stance_pose import hidden_landmarks
+from kinertia.motion.pose_fit import hidden_landmarks
 from kinertia.trial.data import BoolArray, Markers
 from kinertia.trial.marker_quality import LEAST_WALK_M, STANDING_RANGE_M, still_span_s
 from kinertia.trial.sampled_data import runs, span_s

@@ -24,8 +24,8 @@ from kinertia.estimation.result.cycles import (
 from kinertia.estimation.result.figure_names import FitPictures
 from kinertia.estimation.result.gait_scores import GaitProfile, with_norms
 from kinertia.estimation.result.trial_fit import TrialFit
-from kinertia.estimation.simultaneous.calibration_entry import calibration_columns
 from kinertia.estimation.simultaneous.fit import Posterior
+from kinertia.estimation.simultaneous.instruments.instrument_errors import calibration_columns
 from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import asymmetries, asymmetry_columns
 from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.overview import Overview

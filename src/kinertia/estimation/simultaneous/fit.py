@@ -7,9 +7,8 @@ import numpy as np
 
 from kinertia.estimation.identifiability import BaseParameters, base_parameters
 from kinertia.estimation.prior import BspPrior
-from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
-from kinertia.estimation.simultaneous.instruments.impacts import down_weighted
-from kinertia.estimation.simultaneous.instruments.instrument_errors import OTHER_SIGN
+from kinertia.estimation.simultaneous.instruments.instrument_errors import OTHER_SIGN, CalibrationEntry
+from kinertia.estimation.simultaneous.instruments.plates import down_weighted
 from kinertia.estimation.simultaneous.instruments.priors import (
     GAIT27_UNCERTAINTY,
     InstrumentInformation,

@@ -11,8 +11,7 @@ from typing import Self
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kinertia.estimation.simultaneous.instruments.impacts import impact_factors, swing_factors
-from kinertia.estimation.simultaneous.instruments.plates import FootPlates, plate_middles
+from kinertia.estimation.simultaneous.instruments.plates import FootPlates, impact_factors, plate_middles, swing_factors
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
 from kinertia.estimation.simultaneous.linear_algebra.motion_basis import Bandwidth
 from kinertia.estimation.simultaneous.markers.marker_errors import ErrorProcess

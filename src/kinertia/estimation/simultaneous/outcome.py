@@ -6,7 +6,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
+from kinertia.estimation.simultaneous.instruments.instrument_errors import CalibrationEntry
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentInformation
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.search.problem import Linearised, MapProblem, Point

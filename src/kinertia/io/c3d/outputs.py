@@ -16,7 +16,7 @@ import numpy as np
 
 from kinertia.errors import FileError
 from kinertia.findings.quantity import Quantity
-from kinertia.io.c3d.events import EventToWrite, add_events, subject_of
+from kinertia.io.c3d.file_contents import EventToWrite, add_events, subject_of
 from kinertia.io.c3d.parameters import ParameterSection, Value, continued
 from kinertia.io.c3d.structure import doubts_about, with_plain_samples
 from kinertia.io.versions import VERSION

@@ -18,7 +18,6 @@ from kinertia.errors import FileError
 from kinertia.findings.display import first_few
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity, Where
-from kinertia.io.c3d.events import file_events
 from kinertia.io.c3d.ezc3d_library import (
     C3dContent,
     C3dTrouble,
@@ -28,10 +27,10 @@ from kinertia.io.c3d.ezc3d_library import (
     read_in_subprocess,
     text_list,
 )
+from kinertia.io.c3d.file_contents import file_events, subject_data
 from kinertia.io.c3d.outputs import OUTPUT_TYPES, OWN_GROUP, USUAL_UNITS, unit_factor
 from kinertia.io.c3d.plates import PLATE_TYPES, lab_plates, person_on_plates
 from kinertia.io.c3d.structure import doubts_about, with_plain_samples
-from kinertia.io.c3d.subject import subject_data
 from kinertia.io.c3d.theia import POSE_SD_M, Poses, virtual_markers, virtual_places
 from kinertia.io.lab_plates import plate_left_out, to_ground, to_ground_plates
 from kinertia.io.text.number_table import expect_file, left_out, most_seen, people_among, without_prefixes

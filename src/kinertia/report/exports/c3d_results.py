@@ -11,7 +11,7 @@ from kinertia.errors import FileError
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.leg_moments import output_times, outputs_of
 from kinertia.estimation.result.trial_fit import TrialFit
-from kinertia.io.c3d.events import EventToWrite
+from kinertia.io.c3d.file_contents import EventToWrite
 from kinertia.io.c3d.outputs import C3dFrames, Measure, OutputPoint, frames_of, too_many, unit_factor, with_outputs
 from kinertia.io.c3d.parameters import TooManyParameters, Value
 from kinertia.io.c3d.writer import write_c3d

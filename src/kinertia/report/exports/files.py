@@ -28,7 +28,7 @@ from kinertia.io.subject.provenance import Provenance
 from kinertia.io.text.csv_file import inert
 from kinertia.io.text.sto import TimeTable, write_table
 from kinertia.io.versions import VERSION
-from kinertia.model.neutral_joints import centre_offsets
+from kinertia.model.imported_model import centre_offsets
 from kinertia.report.exports.opensim_files import write_ground_reactions
 from kinertia.report.exports.saved_fit import FIT_FILE, write_fit
 from kinertia.report.figures.cycle_figures import CurvesByStage, drawn_curves

@@ -8,8 +8,8 @@ from kinertia.errors import FileError
 from kinertia.estimation.identifiability import BaseParameters, Combination
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.trial_fit import JointCurves, TrialFit
-from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
 from kinertia.estimation.simultaneous.fit import Posterior
+from kinertia.estimation.simultaneous.instruments.instrument_errors import CalibrationEntry
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentInformation
 from kinertia.estimation.simultaneous.markers.marker_noise import MarkerNoise
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations

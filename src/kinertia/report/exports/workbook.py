@@ -19,7 +19,7 @@ from kinertia.estimation.result.cycles import (
 )
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.trial_fit import TrialFit
-from kinertia.estimation.simultaneous.calibration_entry import calibration_columns
+from kinertia.estimation.simultaneous.instruments.instrument_errors import calibration_columns
 from kinertia.io.versions import VERSION
 from kinertia.motion.gait_cycle import PERCENT
 from kinertia.report.exports.files import write_columns

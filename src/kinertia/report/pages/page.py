@@ -15,7 +15,7 @@ from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.leg_moments import coverage_sentence, forces_used, full_bandwidth, gaps_sentence
 from kinertia.estimation.result.mean_cycles import fits_by_task, gait_profile, main_task
 from kinertia.estimation.result.trial_fit import TrialFit
-from kinertia.estimation.simultaneous.calibration_entry import SHOWN_UNIT, item_text, quantity_text
+from kinertia.estimation.simultaneous.instruments.instrument_errors import SHOWN_UNIT, item_text, quantity_text
 from kinertia.io.norms_file import Norm
 from kinertia.io.subject.provenance import Provenance
 from kinertia.io.versions import versions

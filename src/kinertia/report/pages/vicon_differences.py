@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.leg_moments import outputs_of
 from kinertia.estimation.result.trial_fit import TrialFit
-from kinertia.estimation.simultaneous.calibration_entry import DELAY, GAIN
+from kinertia.estimation.simultaneous.instruments.instrument_errors import DELAY, GAIN
 from kinertia.motion.ground_reactions import measured_reactions
 from kinertia.motion.joint_moments import BodyJoint, component_signs, joint_wrenches, leg_joints
 from kinertia.motion.smoothing import smooth

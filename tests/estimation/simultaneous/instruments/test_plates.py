@@ -1,7 +1,10 @@
 """Loads of plates put right, against the steps one by one, and their derivatives against finite differences."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.interpolate import BSpline
 from scipy.spatial.transform import Rotation
 
 from kinertia.estimation.simultaneous.instruments.plates import (
@@ -16,10 +19,18 @@ from kinertia.estimation.simultaneous.instruments.plates import (
     Z,
     by_plate,
     corrected_loads,
+    down_weighted,
+    impact_factors,
     turned_loads,
 )
+from kinertia.settings import Subject
+from kinertia.trial.trial_input import TrialInput
+from kinertia.workflow.estimate import estimate
+from kinertia.workflow.prepare import prepare
 
 N, PLATES = 5, 3
+
+
 UNITS = np.array([1e-2, 1e-2, 0.1, 1e-2, 0.1, 10.0, 10.0])
 
 
@@ -67,3 +78,88 @@ def test_derivatives_are_those_of_the_loads(given, plate, error):
         moved[plate, error] += sign * step
         sides.append(corrected_loads(loads, loaded, carrier, moved, middles, turn))
     np.testing.assert_allclose(by[..., plate, error], (sides[0] - sides[1]) / (2.0 * step), rtol=1e-6, atol=1e-5)
+
+
+SPACING_S, FORCE_SD = 1.0 / 30.0, 4.0
+
+
+TIME = np.arange(120) / 100.0
+
+
+EVERY = np.ones(120, dtype=bool)
+
+
+def pushed(at_s, size_n=100.0, width_s=0.02):
+    force = np.tile([0.0, 700.0, 0.0], (120, 1))
+    force[:, 1] += size_n * np.exp(-(((TIME - at_s) / width_s) ** 2))
+    return force
+
+
+def test_forces_of_the_motion_s_bandwidth_are_as_sure_everywhere():
+    rng = np.random.default_rng(0)
+    knots = np.arange(-5, 20) * 4.0 * SPACING_S
+    force = BSpline(knots, rng.normal(0.0, 200.0, (len(knots) - 4, 3)), 3)(TIME)
+    assert impact_factors(TIME, force, EVERY, SPACING_S, FORCE_SD).max() < 1.02
+
+
+@pytest.mark.parametrize("at_s", 0.6 + SPACING_S * np.linspace(0.0, 1.0, 5))
+def test_an_impact_counts_alike_wherever_it_lies_between_two_knots(at_s):
+    factors = impact_factors(TIME, pushed(at_s), EVERY, SPACING_S, FORCE_SD)
+    # with knots that lie in one way only: 2.8 to 7.9
+    assert 4.5 < factors.max() < 6.0
+    assert factors[np.abs(TIME - at_s) < 0.015].min() > 4.0
+    assert factors[np.abs(TIME - at_s) > 0.2].max() < 1.05
+
+
+def test_frames_that_count_a_quarter_or_less():
+    assert down_weighted(np.array([1.0, 1.9, 2.0, 9.0])) == 0.5
+    assert down_weighted(np.empty(0)) == 0.0
+
+
+def test_intervals_count_by_themselves_and_short_ones_not():
+    dynamic = EVERY.copy()
+    dynamic[70:] = False
+    dynamic[[90, 91, 92]] = True
+    force = pushed(0.75)
+    force[90:93] = 1e6
+    factors = impact_factors(TIME, force, dynamic, SPACING_S, FORCE_SD)
+    assert (factors[70:] == 1.0).all()
+    assert factors[:60].max() < 1.05
+
+
+def test_knots_are_no_closer_than_every_second_frame():
+    assert np.isfinite(impact_factors(TIME, pushed(0.6), EVERY, 0.005, FORCE_SD)).all()
+
+
+def clock_ms(recording_of, person, *moved_ms):
+    """How late the clock is found to be where forces are moved by these times."""
+    walk, static = (recording_of(f"{person}{kind}.c3d") for kind in ("walk", "static"))
+    late = {}
+    for each in moved_ms:
+        plates = replace(walk.plates, time=walk.plates.time + each / 1e3)
+        fit = estimate(prepare(Subject(sex="male"), static, [TrialInput(replace(walk, plates=plates))]))
+        # of a single trial its own is the total
+        (total,) = (one for one in fit.posterior.calibration if one.quantity == "delay" and one.trial is not None)
+        late[each] = 1e3 * total.value
+    # a delay is known to some 3 ms
+    assert (np.diff(list(late.values())) > -1.0).all()
+    return late
+
+
+@pytest.mark.slow
+def test_the_clock_follows_forces_that_are_moved(recording_of):
+    late = clock_ms(recording_of, "synthetic/", -20.0, -8.0, 0.0, 8.0, 15.0)
+    np.testing.assert_allclose(list(late.values()), list(late), atol=0.8)
+
+
+@pytest.mark.slow
+@pytest.mark.measured
+def test_the_clock_follows_forces_that_are_moved_where_the_heel_strikes_sharply(recording_of):
+    """With it as sure as other frames the clock was 12.5 ms late where forces were 8 ms earlier, and 9.8 ms where they
+    were 20 ms earlier, +-0.5 ms; 34 ms apart. A clock that may be sound counts as sound: it follows over some
+    15 ms by a third.
+    """
+    late = clock_ms(recording_of, "pig_c3d/subject_a_", -20.0, -8.0, 0.0, 8.0, 15.0)
+    assert np.ptp([value - moved_ms for moved_ms, value in late.items()]) < 12.0
+    assert late[-20.0] < -5.0 < -3.0 < late[-8.0] < late[0.0] - 5.0
+    assert late[15.0] > 10.0

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from kinertia.estimation.simultaneous.instruments.impacts import SWING, swing_factors
+from kinertia.estimation.simultaneous.instruments.plates import SWING, swing_factors
 
 TIME = np.arange(200) / 100.0
 WEIGHT_N = 700.0

@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.estimation.simultaneous.calibration_entry import BENDING
 from kinertia.estimation.simultaneous.inputs import BSP, PLACES, SKIN, STILL
+from kinertia.estimation.simultaneous.instruments.instrument_errors import BENDING
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.search.problem import MapProblem, Point
 from kinertia.estimation.simultaneous.terms.instrument_term import CLOCK, GAINS, PLATES, TRIAL_DELAYS, ZEROS

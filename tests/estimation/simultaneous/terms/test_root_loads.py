@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from kinertia.estimation.simultaneous.calibration_entry import BENDING
+from kinertia.estimation.simultaneous.instruments.instrument_errors import BENDING
 from kinertia.estimation.simultaneous.terms.root_loads import BendingTrunk
 from kinertia.model.bsp import BodySegmentParameters
 from small_problem import bending, point, small_problem

@@ -21,13 +21,13 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from scipy.linalg import block_diag, cholesky, solve_triangular
 
-from kinertia.estimation.simultaneous.calibration_entry import AXIS, CENTRE, CalibrationEntry
 from kinertia.estimation.simultaneous.inputs import BSP, PLACES, SKIN, STILL, FreedModel, Given, Unknowns
+from kinertia.estimation.simultaneous.instruments.instrument_errors import AXIS, CENTRE, CalibrationEntry
 from kinertia.estimation.simultaneous.linear_algebra.normal_equations import LEAST_INFORMATION
 from kinertia.estimation.simultaneous.terms.cost_term import CostTerm, Solution
 from kinertia.model.anatomy import segment_of
+from kinertia.model.imported_model import joint_and_axis
 from kinertia.model.log_cholesky import nearest_consistent, table_jacobian, to_log_cholesky
-from kinertia.model.neutral_joints import joint_and_axis
 from kinertia.model.skeleton import Skeleton
 
 LEAST_TASK_SD, TASK_SD_PER_RAD = 0.1, 0.095

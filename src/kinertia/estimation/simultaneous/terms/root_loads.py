@@ -15,8 +15,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.calibration_entry import BENDING, CalibrationEntry
 from kinertia.estimation.simultaneous.inputs import BSP, FreedModel, Given, Unknowns
+from kinertia.estimation.simultaneous.instruments.instrument_errors import BENDING, CalibrationEntry
 from kinertia.estimation.simultaneous.linear_algebra.normal_equations import Gradient, NormalEquations
 from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, FaultMixture
 from kinertia.estimation.simultaneous.terms.cost_term import CostTerm, InTrial, Solution

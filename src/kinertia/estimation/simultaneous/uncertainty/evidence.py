@@ -21,7 +21,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from scipy.special import ndtri
 
-from kinertia.estimation.simultaneous.calibration_entry import GAIN, INTERVAL_SD, POSITION, CalibrationEntry
+from kinertia.estimation.simultaneous.instruments.instrument_errors import GAIN, INTERVAL_SD, POSITION, CalibrationEntry
 from kinertia.estimation.simultaneous.linear_algebra.normal_equations import StaticInformation
 from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, FaultMixture, GaussianPrior, log_chance
 from kinertia.estimation.simultaneous.observation import Observation

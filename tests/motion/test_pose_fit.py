@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kinertia.io.marker_set_file import marker_set_of
-from kinertia.motion.stance_pose import stance_pose
+from kinertia.motion.pose_fit import stance_pose
 from kinertia.trial.data import Markers
 
 
