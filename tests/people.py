@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from kinertia.diagnostics.context import PersonContext, RecordingContext
-from kinertia.estimation.prepare.prepared import TotalMass
+from kinertia.estimation.prepared import TotalMass
 from kinertia.findings.finding import Finding
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.imported_model import OsimModel

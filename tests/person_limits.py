@@ -16,7 +16,7 @@ from kinertia.diagnostics.subject.mass import masses_of_trials, stated_mass
 from kinertia.diagnostics.subject.movements import flat_feet
 from kinertia.diagnostics.subject.same_person import static_and_trials, trials_of_one_person
 from kinertia.diagnostics.subject.same_session import trial_scales
-from kinertia.estimation.prepare.prepared import TotalMass
+from kinertia.estimation.prepared import TotalMass
 from kinertia.findings.quantity import Where
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import Markers, Recording

@@ -1,6 +1,6 @@
 """Result folders of few small files."""
 
-from kinertia.io.results.output_folder import complete_folder
+from kinertia.io.output_folder import complete_folder
 
 
 def write(folder, text, *names, kind="fit"):

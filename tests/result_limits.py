@@ -12,7 +12,7 @@ from kinertia.diagnostics.model.model_on_person import model_and_trials
 from kinertia.diagnostics.result import plate_errors, residuals, soundness
 from kinertia.diagnostics.result.corrections import delays, session_contradictions, zero_offsets
 from kinertia.diagnostics.result.residuals import moved_markers, residuals_of
-from kinertia.estimation.prepare.prepared import TotalMass
+from kinertia.estimation.prepared import TotalMass
 from kinertia.estimation.simultaneous.instruments.instrument_errors import (
     DELAY,
     FREE_MOMENT,

@@ -7,7 +7,7 @@ import numpy as np
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.registry import ESTIMATE_CHECKS
 from kinertia.diagnostics.runner import asked, explained
-from kinertia.estimation.prepare.prepared import TotalMass
+from kinertia.estimation.prepared import TotalMass
 from kinertia.estimation.simultaneous.instruments.instrument_errors import DELAY, CalibrationEntry
 from kinertia.estimation.simultaneous.instruments.priors import (
     GAIT27_UNCERTAINTY,

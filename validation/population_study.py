@@ -17,7 +17,7 @@ from functools import partial
 import numpy as np
 
 from kinertia.estimation.learnt_prior import FEWEST_PEOPLE, LearntPrior, PersonInformation, learn, person_information
-from kinertia.estimation.prepare.prepared import known
+from kinertia.estimation.prepared import known
 from kinertia.estimation.prior import BspPrior, literature_prior, population_prior
 from kinertia.estimation.simultaneous.fit import calibration_prior
 from kinertia.estimation.simultaneous.instruments.priors import GAIT27_UNCERTAINTY, InstrumentPrior

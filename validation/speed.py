@@ -22,7 +22,7 @@ import typer
 from threadpoolctl import threadpool_limits
 
 from kinertia.estimation.identifiability import ParameterVector
-from kinertia.estimation.prepare.prepared import known
+from kinertia.estimation.prepared import known
 from kinertia.estimation.two_level import TwoLevelProblem, Window, intervals
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.io.recording import read_recording

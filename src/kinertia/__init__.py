@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from kinertia.errors import SettingsError as SettingsError
     from kinertia.errors import SubjectError as SubjectError
     from kinertia.errors import TrialError as TrialError
-    from kinertia.estimation.prepare.prepared import Prepared as Prepared
+    from kinertia.estimation.prepared import Prepared as Prepared
     from kinertia.estimation.prior import BspPrior as BspPrior
     from kinertia.estimation.prior import literature_prior as literature_prior
     from kinertia.estimation.result.fit import Fit as Fit
@@ -123,7 +123,7 @@ _ROOMS = {
     "io.recording": "read_recording",
     "io.subject.reader": "read_subject",
     "io.subject.tables": "SubjectFile",
-    "estimation.prepare.prepared": "Prepared",
+    "estimation.prepared": "Prepared",
     "estimation.prior": "BspPrior literature_prior",
     "estimation.result.fit": "Fit",
     "estimation.result.trial_fit": "TrialFit",

@@ -19,7 +19,7 @@ from command_line import PROGRAM, run
 from kinertia.cli.cohort import _LOCK
 from kinertia.cohort.cluster import doubts_of_workers
 from kinertia.errors import how_to_install
-from kinertia.io.results.working_folder import sole_use
+from kinertia.io.working_folder import sole_use
 from kinertia.report.exports.files import save_fit
 from kinertia.workflow.from_files import fit_subject
 

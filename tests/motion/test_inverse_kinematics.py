@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from generic_static import generic_model, random_coordinates, smooth_motion
 from kinertia.errors import MarkerSetError, TrialError
-from kinertia.estimation.prepare.calibration import sampled
+from kinertia.estimation.calibration import sampled
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.io.opensim.reader import read_osim
 from kinertia.io.recording import read_recording

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from kinertia.errors import PriorError
 from kinertia.estimation.learnt_prior import LearntPrior
-from kinertia.estimation.prepare.prepared import Prepared
+from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.instruments.priors import GAIT27_UNCERTAINTY
 from kinertia.io.subject.body_files import BspTable

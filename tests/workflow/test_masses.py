@@ -7,7 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from kinertia.errors import BlockedError, PriorError, SettingsError
-from kinertia.estimation.prepare.prepared import Prepared, TotalMass
+from kinertia.estimation.prepared import Prepared, TotalMass
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.fit import calibration_prior
 from kinertia.estimation.simultaneous.instruments.instrument_errors import GAIN, CalibrationEntry

@@ -32,7 +32,7 @@ from kinertia.cli.common import (
 )
 from kinertia.cli.findings import show_idle_waivers, show_overview, waivers_reported
 from kinertia.errors import FileError
-from kinertia.estimation.prepare.prepared import Progress
+from kinertia.estimation.prepared import Progress
 from kinertia.findings.overview import Overview
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.opensim.reader import read_osim

@@ -48,7 +48,7 @@ from kinertia.cohort.worker import fit_person
 from kinertia.errors import SettingsError
 from kinertia.estimation.result.mean_cycles import expect_all_nine
 from kinertia.io.norms_file import Norm, read_norms
-from kinertia.io.results.working_folder import sole_use
+from kinertia.io.working_folder import sole_use
 
 _LOCK = ".kinertia-cohort.lock"
 _MOST_SHOWN = 20

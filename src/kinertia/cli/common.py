@@ -24,7 +24,7 @@ from kinertia.cli.compiling import compile_once
 from kinertia.diagnostics.runner import unknown_codes
 from kinertia.errors import BlockedError, FileError, KinertiaError, findings_of
 from kinertia.findings.rule import matching
-from kinertia.io.results.output_folder import check_folder, expect_own_folder
+from kinertia.io.output_folder import check_folder, expect_own_folder
 from kinertia.settings import Overrule, number_of, sex_of
 
 if TYPE_CHECKING:

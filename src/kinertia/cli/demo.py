@@ -16,9 +16,9 @@ import typer
 
 from kinertia.cli.common import Outcome, Output, Overwrite, Quiet, out, plain_table, results_folder, shown_progress
 from kinertia.cli.findings import show_coverage, show_overview
-from kinertia.estimation.prepare.prepared import Progress
+from kinertia.estimation.prepared import Progress
 from kinertia.estimation.result.fit import Fit
-from kinertia.io.results.output_folder import complete_folder
+from kinertia.io.output_folder import complete_folder
 from kinertia.io.samples import SHA256, sample_walk
 from kinertia.io.subject.person_recordings import read_inputs
 from kinertia.io.subject.provenance import command_line, provenance_of

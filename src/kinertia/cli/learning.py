@@ -19,8 +19,8 @@ from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.mean_cycles import Control, band_columns, mixture
 from kinertia.estimation.simultaneous.instruments.instrument_errors import SHOWN_UNIT
 from kinertia.io.norms_file import read_norms
+from kinertia.io.output_folder import write_then_rename
 from kinertia.io.recording import MARKER_FILES
-from kinertia.io.results.output_folder import write_then_rename
 from kinertia.io.subject.learnt_files import expect_session, population_text, read_population, session_text
 from kinertia.io.subject.provenance import recordings
 from kinertia.io.subject.reader import read_subject

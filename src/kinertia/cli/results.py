@@ -14,7 +14,7 @@ from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.gait_scores import with_norms
 from kinertia.estimation.result.mean_cycles import check_convention, gait_profile
 from kinertia.io.norms_file import Norm, read_norms
-from kinertia.io.results.output_folder import complete_folder, updated_files
+from kinertia.io.output_folder import complete_folder, updated_files
 from kinertia.io.subject.provenance import names_from_common_folder
 from kinertia.io.versions import VERSION
 from kinertia.motion.model_outputs import CLINICAL_ANGLES, CONVENTIONS

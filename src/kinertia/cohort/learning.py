@@ -19,9 +19,9 @@ from kinertia.cohort.people import Participant
 from kinertia.cohort.record import RECORD, Place
 from kinertia.errors import KinertiaError, PriorError
 from kinertia.estimation.learnt_prior import FEWEST_PEOPLE, LearntPrior, PersonInformation, information_of, learn
-from kinertia.estimation.prepare.prepared import known
+from kinertia.estimation.prepared import known
 from kinertia.io.file_names import path_from
-from kinertia.io.results.output_folder import write_then_rename
+from kinertia.io.output_folder import write_then_rename
 from kinertia.io.subject.learnt_files import PersonInstruments, population_text, session_text
 from kinertia.io.subject.person_recordings import session_date
 from kinertia.io.subject.provenance import recordings, sha256

@@ -23,7 +23,7 @@ from kinertia.findings.finding import Severity
 from kinertia.findings.overview import USES
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.rule import matching, rule
-from kinertia.io.results.output_folder import write_then_rename
+from kinertia.io.output_folder import write_then_rename
 from kinertia.model.bsp import PARAMETERS
 from kinertia.motion.gait_cycle import PERCENT
 from kinertia.report.figures import style

@@ -14,13 +14,13 @@ from typing import Any
 
 from kinertia.cohort.people import Participant
 from kinertia.errors import KinertiaError
+from kinertia.io.output_folder import write_then_rename
 from kinertia.io.recording import frame_count
-from kinertia.io.results.output_folder import write_then_rename
-from kinertia.io.results.working_folder import sweep
 from kinertia.io.subject.provenance import sha256
 from kinertia.io.subject.reader import read_subject
 from kinertia.io.subject.tables import SubjectFile
 from kinertia.io.versions import VERSION
+from kinertia.io.working_folder import sweep
 
 RECORD = "person.json"
 PASSED, AGAINST, BAD_INPUT, FAILED = 0, 1, 2, 70

@@ -27,7 +27,7 @@ from kinertia.cohort.tables import write_findings, write_person
 from kinertia.errors import KinertiaError, internal_error
 from kinertia.estimation.result.fit import Fit
 from kinertia.findings.finding import Severity
-from kinertia.io.results.output_folder import complete_folder, write_then_rename
+from kinertia.io.output_folder import complete_folder, write_then_rename
 from kinertia.io.subject.person_recordings import session_date
 from kinertia.io.subject.provenance import command_line, provenance_of
 from kinertia.io.subject.reader import read_subject

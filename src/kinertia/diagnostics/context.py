@@ -36,7 +36,7 @@ from kinertia.diagnostics.evidence.plate_contacts import PlateContact, contact_s
 from kinertia.diagnostics.evidence.trajectory_faults import FEWEST_FRAMES, TrajectoryFaults, without_copied_frames
 from kinertia.diagnostics.marker_context import MarkerContext
 from kinertia.errors import KinertiaError
-from kinertia.estimation.prepare.prepared import TotalMass
+from kinertia.estimation.prepared import TotalMass
 from kinertia.findings.finding import Finding, Severity
 from kinertia.model.imported_model import OsimModel
 from kinertia.model.marker_set import MarkerSet

@@ -18,7 +18,7 @@ from kinertia.diagnostics.result.corrections import APART_SD
 from kinertia.diagnostics.result.registry import ESTIMATE_CHECKS, RESULT_CHECKS
 from kinertia.diagnostics.runner import Check
 from kinertia.estimation.body_measures import FAR_SD
-from kinertia.estimation.prepare.prepared import CALIBRATED_M, KNOWN_BODY_SD, LIGHT_KG, MODEL_MASS_SHARE
+from kinertia.estimation.prepared import CALIBRATED_M, KNOWN_BODY_SD, LIGHT_KG, MODEL_MASS_SHARE
 from kinertia.findings.display import exact
 from kinertia.findings.quantity import Limit
 from kinertia.findings.rule import Rule

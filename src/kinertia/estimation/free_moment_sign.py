@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinertia.estimation.prepare.prepared import Prepared
+from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.simultaneous.fit import SimultaneousFit, compared_with
 from kinertia.estimation.simultaneous.instruments.instrument_errors import OTHER_SIGN, POSITION, CalibrationEntry
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from kinertia.estimation.prepare.prepared import Prepared
+from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import Asymmetry, asymmetries
 from kinertia.model.bsp import PARAMETERS, UNITS

@@ -12,7 +12,7 @@ from typing import Literal
 
 from kinertia.errors import KinertiaError
 from kinertia.estimation.free_moment_sign import with_likelier_sign
-from kinertia.estimation.prepare.prepared import Prepared, Progress
+from kinertia.estimation.prepared import Prepared, Progress
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.fit import SimultaneousFit, fit_simultaneous
 from kinertia.estimation.simultaneous.linear_algebra.motion_basis import Bandwidth

@@ -21,7 +21,7 @@ import pandas as pd
 from scipy.linalg import block_diag
 
 from kinertia.estimation.identifiability import evidence
-from kinertia.estimation.prepare.prepared import Prepared
+from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.simultaneous.fit import calibration_prior, observed, used_skeleton
 from kinertia.estimation.simultaneous.inputs import BSP

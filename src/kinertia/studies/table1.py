@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from kinertia.estimation.identifiability import ParameterVector
-from kinertia.estimation.prepare.prepared import Progress
+from kinertia.estimation.prepared import Progress
 from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level
 from kinertia.io.subject.person_recordings import read_inputs
 from kinertia.io.subject.tables import SubjectFile

@@ -21,7 +21,7 @@ import numpy as np
 import pandas as pd
 
 from kinertia.errors import TrialError
-from kinertia.io.results.output_folder import complete_folder
+from kinertia.io.output_folder import complete_folder
 from kinertia.io.text.sto import write_sto
 from kinertia.io.text.trc import write_trc
 from kinertia.model.skeleton import Skeleton, skin_angles

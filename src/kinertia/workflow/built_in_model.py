@@ -8,7 +8,7 @@ from kinertia.diagnostics.result.residuals import TORSO_RAD
 from kinertia.diagnostics.runner import blocking
 from kinertia.diagnostics.subject.body_data import unobserved_segments
 from kinertia.errors import BlockedError, MarkerSetError, SettingsError, TrialError
-from kinertia.estimation.prepare.calibration import (
+from kinertia.estimation.calibration import (
     Adaptation,
     AdaptationInputs,
     adapt,
@@ -17,7 +17,7 @@ from kinertia.estimation.prepare.calibration import (
     turn_about,
     without_partly_shown,
 )
-from kinertia.estimation.prepare.model_adaptation import (
+from kinertia.estimation.model_adaptation import (
     elbow_rotations,
     show_knee_axes,
     shows_trunk,
@@ -25,7 +25,7 @@ from kinertia.estimation.prepare.model_adaptation import (
     with_rotating_arms,
     with_upright_trunk,
 )
-from kinertia.estimation.prepare.prepared import CALIBRATED_M, TotalMass, complete_subject, known
+from kinertia.estimation.prepared import CALIBRATED_M, TotalMass, complete_subject, known
 from kinertia.estimation.prior import literature_prior, population_prior
 from kinertia.estimation.simultaneous.instruments.priors import (
     GAIT27_UNCERTAINTY,

@@ -11,7 +11,7 @@ from kinertia.diagnostics.result.registry import ESTIMATE_CHECKS, RESULT_CHECKS,
 from kinertia.diagnostics.runner import explained, overruled, rules_of
 from kinertia.errors import SettingsError
 from kinertia.estimation.free_moment_sign import Signed, with_likelier_sign
-from kinertia.estimation.prepare.prepared import Prepared, Progress
+from kinertia.estimation.prepared import Prepared, Progress
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.trial_fit import JointCurves, TrialFit

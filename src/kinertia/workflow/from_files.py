@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinertia.errors import PriorError, SessionError, SettingsError
-from kinertia.estimation.prepare.prepared import Prepared, Progress
+from kinertia.estimation.prepared import Prepared, Progress
 from kinertia.estimation.result.fit import Fit
 from kinertia.findings.finding import finding
 from kinertia.findings.quantity import Quantity

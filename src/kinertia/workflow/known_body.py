@@ -13,8 +13,8 @@ import numpy as np
 from kinertia.errors import PriorError
 from kinertia.estimation.body_measures import with_measures
 from kinertia.estimation.learnt_prior import LearntPrior
-from kinertia.estimation.prepare.prepared import KNOWN_BODY_SD, Prepared, body_sd_kg
-from kinertia.estimation.prepare.prepared import known as known_value
+from kinertia.estimation.prepared import KNOWN_BODY_SD, Prepared, body_sd_kg
+from kinertia.estimation.prepared import known as known_value
 from kinertia.estimation.prior import BspPrior, literature_prior, updated, with_symmetry
 from kinertia.findings.display import shown
 from kinertia.findings.finding import Finding, finding

@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from kinertia.errors import PriorError
-from kinertia.estimation.prepare.prepared import Prepared, known, mass_of
+from kinertia.estimation.prepared import Prepared, known, mass_of
 from kinertia.estimation.prior import SECOND_MOMENT_SD, BspPrior, inertia_covariance
 from kinertia.estimation.simultaneous.fit import SimultaneousFit
 from kinertia.estimation.simultaneous.instruments.instrument_errors import GAIN, CalibrationEntry

@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from kinertia.diagnostics.model.model_on_person import moved_markers
-from kinertia.estimation.prepare.calibration import AdaptationInputs, adapt, first_poses, lock_undetermined
-from kinertia.estimation.prepare.prepared import MODEL_MASS_SHARE, TotalMass, complete_subject, estimated_bodies, known
+from kinertia.estimation.calibration import AdaptationInputs, adapt, first_poses, lock_undetermined
+from kinertia.estimation.prepared import MODEL_MASS_SHARE, TotalMass, complete_subject, estimated_bodies, known
 from kinertia.estimation.prior import SCALE_SD, BspPrior, literature_prior, population_prior
 from kinertia.estimation.simultaneous.instruments.priors import (
     JOINT_CENTRE_SD_M,

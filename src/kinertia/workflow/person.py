@@ -15,7 +15,7 @@ from kinertia.diagnostics.evidence.trajectory_faults import without_copied_frame
 from kinertia.diagnostics.model.model_on_person import range_findings
 from kinertia.diagnostics.subject.movements import task_of
 from kinertia.errors import BlockedError, KinertiaError, MarkerSetError, SettingsError, SubjectError, TrialError
-from kinertia.estimation.prepare.prepared import Progress, complete_subject, lacking
+from kinertia.estimation.prepared import Progress, complete_subject, lacking
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.instruments.priors import ModelUncertainty
 from kinertia.findings.finding import Finding

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from kinertia.diagnostics.subject.body_data import stated_ranges
 from kinertia.errors import SettingsError
-from kinertia.estimation.prepare.prepared import Prepared, Progress, check_trials
+from kinertia.estimation.prepared import Prepared, Progress, check_trials
 from kinertia.model.imported_model import OsimModel
 from kinertia.model.marker_set import MarkerSet
 from kinertia.motion.workload import one_blas_thread

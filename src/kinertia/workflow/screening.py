@@ -26,7 +26,7 @@ from kinertia.diagnostics.runner import (
     rules_of,
 )
 from kinertia.errors import BlockedError, KinertiaError, MarkerSetError, SubjectError
-from kinertia.estimation.prepare.prepared import TotalMass
+from kinertia.estimation.prepared import TotalMass
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.lab_plates import rotation_of_line

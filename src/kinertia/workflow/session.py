@@ -7,7 +7,7 @@ import numpy as np
 
 from kinertia.diagnostics.result.corrections import session_contradictions
 from kinertia.errors import SessionError
-from kinertia.estimation.prepare.prepared import Prepared
+from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.simultaneous.instruments.instrument_errors import (
     CalibrationEntry,

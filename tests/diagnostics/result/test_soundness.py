@@ -9,7 +9,7 @@ import pytest
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.soundness import attached_items, forces_of_the_motion, soundness, total_mass
 from kinertia.diagnostics.runner import explained
-from kinertia.estimation.prepare.prepared import TotalMass
+from kinertia.estimation.prepared import TotalMass
 from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import OneSided, Unlikeness
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.settings import Attached

@@ -10,7 +10,7 @@ import pytest
 from kinertia.diagnostics.result.suitability import suitability
 from kinertia.errors import FileError
 from kinertia.findings.finding import Severity
-from kinertia.io.results.output_folder import check_folder
+from kinertia.io.output_folder import check_folder
 from kinertia.io.text.sto import read_sto
 from kinertia.report.exports.files import FIT_FILES, TRIAL_FILES, save_fit, summary
 from kinertia.settings import Settings

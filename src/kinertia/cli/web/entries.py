@@ -19,7 +19,7 @@ from kinertia.cli.web.library import SUBJECT, PersonFolder
 from kinertia.cli.web.rows import Field, choices_of, with_rows
 from kinertia.errors import KinertiaError, SettingsError
 from kinertia.io.marker_set_file import preset_names
-from kinertia.io.results.output_folder import write_then_rename
+from kinertia.io.output_folder import write_then_rename
 from kinertia.io.subject.draft import init_subject
 from kinertia.io.subject.reader import read_subject
 from kinertia.io.subject.tables import subject_text

@@ -24,11 +24,11 @@ from typing import Any
 from kinertia.cohort.record import inputs_of
 from kinertia.errors import FileError, KinertiaError
 from kinertia.io.file_names import fits_everywhere, last_part, same_folder
+from kinertia.io.output_folder import check_folder, write_then_rename
 from kinertia.io.recording import FORCE_FILES, MARKER_FILES
-from kinertia.io.results.output_folder import check_folder, write_then_rename
-from kinertia.io.results.working_folder import sole_use, sweep
 from kinertia.io.subject.provenance import sha256
 from kinertia.io.subject.reader import read_subject
+from kinertia.io.working_folder import sole_use, sweep
 
 SUBJECT, SUMMARY, OUTCOME = "subject.toml", "fit.json", "outcome.json"
 LOG = "failure.log"

@@ -21,8 +21,8 @@ from kinertia.errors import FileError, KinertiaError, SettingsError
 from kinertia.io.marker_set_draft import marker_set_text, places_of
 from kinertia.io.marker_set_file import preset_names, read_marker_set
 from kinertia.io.opensim.reader import read_osim
+from kinertia.io.output_folder import write_then_rename
 from kinertia.io.recording import read_recording
-from kinertia.io.results.output_folder import write_then_rename
 from kinertia.model.imported_model import markers_of_model
 from kinertia.model.marker_set import LANDMARKS, SEGMENTS, MarkerSet
 from kinertia.trial.data import FloatArray, Markers

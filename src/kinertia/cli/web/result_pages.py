@@ -7,7 +7,7 @@ from kinertia.cli.web.library import Library, PersonFolder
 from kinertia.errors import KinertiaError
 from kinertia.estimation.result.mean_cycles import Control, band_columns
 from kinertia.io.norms_file import read_norms
-from kinertia.io.results.output_folder import write_then_rename
+from kinertia.io.output_folder import write_then_rename
 from kinertia.report.comparison.side_by_side import render_comparison
 from kinertia.report.comparison.what_changed import compare, compared_sessions
 from kinertia.report.exports.saved_fit import load_fit, read_saved

@@ -32,7 +32,7 @@ from kinertia.cli.web.responses import (
     to,
 )
 from kinertia.errors import KinertiaError, internal_error
-from kinertia.io.results.output_folder import complete_folder, expect_own_folder
+from kinertia.io.output_folder import complete_folder, expect_own_folder
 from kinertia.io.samples import SIZE_MB
 from kinertia.io.subject.body_files import measures_sheet
 from kinertia.report.figures.measures_picture import measures_picture

@@ -16,7 +16,7 @@ from typing import Any, TextIO
 from kinertia.cli.compiling import compile_once
 from kinertia.cli.web.library import OUTCOME, SUBJECT, SUMMARY, PersonFolder
 from kinertia.errors import KinertiaError
-from kinertia.io.results.output_folder import complete_folder
+from kinertia.io.output_folder import complete_folder
 from kinertia.io.subject.provenance import command_line, sha256
 from kinertia.io.subject.reader import read_subject
 

@@ -20,7 +20,7 @@ import numpy as np
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.trajectory_faults import step_limit_m, steps
 from kinertia.diagnostics.runner import NEEDS_LENGTH_UNIT, NEEDS_MEASURED_FRAMES, check
-from kinertia.estimation.prepare.calibration import sampled
+from kinertia.estimation.calibration import sampled
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.model.gait27 import ARM_ROTATIONS, ELBOWS

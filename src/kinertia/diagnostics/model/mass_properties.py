@@ -19,7 +19,7 @@ from kinertia.diagnostics.model.model_check import (
 )
 from kinertia.diagnostics.runner import check
 from kinertia.diagnostics.subject.mass import ERROR_SHARE, WARNING_SHARE
-from kinertia.estimation.prepare.prepared import estimated_bodies
+from kinertia.estimation.prepared import estimated_bodies
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.model.anatomy import segment_of

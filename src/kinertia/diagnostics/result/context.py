@@ -7,7 +7,7 @@ from functools import cached_property
 from kinertia.diagnostics.evidence.force_mass import ForceMass, force_mass
 from kinertia.diagnostics.evidence.landmarks import owners_of
 from kinertia.diagnostics.marker_context import Axes
-from kinertia.estimation.prepare.prepared import Prepared
+from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.simultaneous.instruments.instrument_errors import CalibrationEntry
 from kinertia.findings.quantity import Where

@@ -29,7 +29,7 @@ from kinertia.diagnostics.evidence.landmarks import owners_of
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.corrections import equal, reported
 from kinertia.diagnostics.runner import check
-from kinertia.estimation.prepare.model_adaptation import BACKWARDS_RAD
+from kinertia.estimation.model_adaptation import BACKWARDS_RAD
 from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.estimation.simultaneous.instruments.instrument_errors import AXIS, POSITION, CalibrationEntry
 from kinertia.estimation.simultaneous.instruments.priors import JOINT_AXIS_SD_RAD

@@ -10,7 +10,7 @@ import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.runner import check
-from kinertia.estimation.prepare.prepared import mass_by_force_kg
+from kinertia.estimation.prepared import mass_by_force_kg
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import UNLIKE_CHANCE, OneSided, Unlikeness

@@ -17,7 +17,7 @@ import numpy as np
 from kinertia.diagnostics.context import PersonContext, odd_ones
 from kinertia.diagnostics.evidence.force_mass import MISSING, MOSTLY, UNMEASURED_S, ForceMass, UnmeasuredSupport
 from kinertia.diagnostics.runner import check
-from kinertia.estimation.prepare.prepared import TotalMass
+from kinertia.estimation.prepared import TotalMass
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.model.skeleton import GRAVITY_M_S2

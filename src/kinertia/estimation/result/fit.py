@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from kinertia.estimation.identifiability import evidence
-from kinertia.estimation.prepare.prepared import known
+from kinertia.estimation.prepared import known
 from kinertia.estimation.result.curve_source import Stage
 from kinertia.estimation.result.cycles import (
     Kind,

@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 
 from kinertia.io.opensim.reader import INERTIA_TAGS, body_elements, marker_elements
 from kinertia.io.opensim.xml import Element, parse, replaced
-from kinertia.io.results.output_folder import write_then_rename
+from kinertia.io.output_folder import write_then_rename
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.imported_model import OsimModel
 from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton, inverse, placed, placed_by

@@ -11,7 +11,7 @@ import numpy as np
 from kinertia.errors import FileError
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity, Where
-from kinertia.io.results.output_folder import write_then_rename
+from kinertia.io.output_folder import write_then_rename
 from kinertia.io.text.number_table import (
     malformed,
     mismatch,

@@ -23,7 +23,7 @@ from kinertia.estimation.changes.session_changes import (
     session_features,
     why_incomparable,
 )
-from kinertia.estimation.prepare.prepared import Prepared, Progress
+from kinertia.estimation.prepared import Prepared, Progress
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.mean_cycles import check_convention, expect_all_nine
 from kinertia.estimation.result.trial_fit import TrialFit

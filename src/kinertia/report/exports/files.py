@@ -23,7 +23,7 @@ from kinertia.estimation.result.leg_moments import forces_before, forces_used, m
 from kinertia.estimation.result.trial_fit import JointCurves, TrialFit
 from kinertia.findings.finding import Severity
 from kinertia.io.opensim.writer import export_osim
-from kinertia.io.results.output_folder import complete_folder, expect_own_folder
+from kinertia.io.output_folder import complete_folder, expect_own_folder
 from kinertia.io.subject.provenance import Provenance
 from kinertia.io.text.csv_file import inert
 from kinertia.io.text.sto import TimeTable, write_table

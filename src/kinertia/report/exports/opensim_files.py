@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kinertia.io.results.output_folder import write_then_rename
+from kinertia.io.output_folder import write_then_rename
 from kinertia.io.text.sto import TimeTable, write_table
 from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.trial.data import FEET

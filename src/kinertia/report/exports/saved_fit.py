@@ -18,7 +18,7 @@ from kinertia.estimation.simultaneous.uncertainty.posterior_draws import Posteri
 from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import OneSided, Unlikeness
 from kinertia.findings.finding import Finding
 from kinertia.findings.quantity import Quantity, Where
-from kinertia.io.results.object_archive import read_archive, write_archive
+from kinertia.io.object_archive import read_archive, write_archive
 from kinertia.io.subject.provenance import Provenance
 from kinertia.io.versions import VERSION, versions
 from kinertia.model.bsp import BodySegmentParameters

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from kinertia.errors import FileError
-from kinertia.io.results.output_folder import write_then_rename
+from kinertia.io.output_folder import write_then_rename
 from kinertia.model.compiled import cache_folder
 from kinertia.report.figures import style
 

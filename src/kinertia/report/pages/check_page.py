@@ -10,7 +10,7 @@ import numpy as np
 from kinertia.diagnostics.plates.ground_contact import Contact
 from kinertia.findings.finding import Finding
 from kinertia.findings.overview import Overview, reported
-from kinertia.io.results.output_folder import complete_folder
+from kinertia.io.output_folder import complete_folder
 from kinertia.report.figures import style
 from kinertia.report.figures.figure import Figure, Panel, base_layout, compact, plain, small_multiples, written
 from kinertia.report.figures.marker_figures import gap_figure, marker_scene

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from kinertia.io.results.output_folder import complete_folder
+from kinertia.io.output_folder import complete_folder
 from kinertia.io.versions import VERSION
 from kinertia.report.figures.figure import bar_figure, dot_figure
 from kinertia.report.figures.plots import has_matplotlib

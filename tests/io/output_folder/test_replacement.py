@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from kinertia.errors import FileError
-from kinertia.io.results.output_folder import complete_folder, put_in_place, updated_files
+from kinertia.io.output_folder import complete_folder, put_in_place, updated_files
 from result_files import texts_of, write
 
 
@@ -67,8 +67,8 @@ def test_a_file_system_without_links_and_exchange(results, monkeypatch):
     def no_link(*arguments, **options):
         raise OSError(1, "Operation not permitted")
 
-    monkeypatch.setattr("kinertia.io.results.output_folder.os.link", no_link)
-    monkeypatch.setattr("kinertia.io.results.output_folder._exchanged", lambda one, other: False)
+    monkeypatch.setattr("kinertia.io.output_folder.os.link", no_link)
+    monkeypatch.setattr("kinertia.io.output_folder._exchanged", lambda one, other: False)
     (results / "mine.txt").write_text("mine", encoding="utf-8")
     _write_again(results)
     assert texts_of(results) == {**NEW, "mine.txt": "mine"}
@@ -81,7 +81,7 @@ def test_a_file_that_comes_while_folders_are_exchanged_is_kept(results, monkeypa
         (folder / "late" / "mine.txt").write_text("mine", encoding="utf-8")
         return put_in_place(new, folder, aside)
 
-    monkeypatch.setattr("kinertia.io.results.output_folder.put_in_place", late)
+    monkeypatch.setattr("kinertia.io.output_folder.put_in_place", late)
     _write_again(results)
     assert texts_of(results) == {**NEW, "late/mine.txt": "mine"}
 
@@ -140,8 +140,8 @@ def _busy(monkeypatch, step):
             raise PermissionError(13, "Access is denied", str(source), 5, str(target))
         rename(source, target)
 
-    monkeypatch.setattr("kinertia.io.results.output_folder.os.rename", renamed)
-    monkeypatch.setattr("kinertia.io.results.output_folder._exchanged", lambda one, other: False)
+    monkeypatch.setattr("kinertia.io.output_folder.os.rename", renamed)
+    monkeypatch.setattr("kinertia.io.output_folder._exchanged", lambda one, other: False)
 
 
 @pytest.mark.parametrize("step", [0, 1])

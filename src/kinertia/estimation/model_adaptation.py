@@ -20,7 +20,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinertia.estimation.prepare.calibration import first_poses
+from kinertia.estimation.calibration import first_poses
 from kinertia.model.gait27 import ARM_ROTATIONS, ELBOWS, ENOUGH_TRUNK_MARKERS, KNEES, UPPER_ARM_ROTATIONS, VIRTUAL_TRUNK
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.inverse_kinematics import InverseKinematics

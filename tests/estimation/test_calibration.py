@@ -3,9 +3,9 @@ import pytest
 
 from generic_static import generic_model, smooth_motion
 from kinertia.errors import TrialError
-from kinertia.estimation.prepare import calibration
-from kinertia.estimation.prepare.calibration import AdaptationInputs, first_poses, sampled, turn_about
-from kinertia.estimation.prepare.model_adaptation import elbow_rotations, with_elbows_that_bend_forwards
+from kinertia.estimation import calibration
+from kinertia.estimation.calibration import AdaptationInputs, first_poses, sampled, turn_about
+from kinertia.estimation.model_adaptation import elbow_rotations, with_elbows_that_bend_forwards
 from kinertia.model.gait27 import ARM_COORDINATES, ARM_ROTATIONS, SHOULDER_OFFSETS
 from kinertia.model.skeleton import Marker
 from kinertia.trial.data import FootLoads, Markers, Trial

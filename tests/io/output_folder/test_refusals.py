@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from kinertia.errors import FileError
-from kinertia.io.results.output_folder import GENERATOR, check_folder, expect_own_folder
+from kinertia.io.output_folder import GENERATOR, check_folder, expect_own_folder
 
 
 @pytest.mark.parametrize("name", ["missing", "empty", ".DS_Store", "desktop.ini", ".gitkeep", ".kinertia-cohort.lock"])

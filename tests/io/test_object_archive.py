@@ -11,7 +11,7 @@ from hypothesis.extra import numpy as arrays
 from scipy.interpolate import BSpline
 
 from kinertia.errors import FileError
-from kinertia.io.results.object_archive import read_archive, write_archive
+from kinertia.io.object_archive import read_archive, write_archive
 
 
 @dataclass(frozen=True, eq=False)

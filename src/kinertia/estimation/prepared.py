@@ -50,7 +50,7 @@ class TotalMass:
         >>> pack = kinertia.Attached(
         ...     name="rucksack", segment="torso", mass_kg="10 +- 0.5", com_mm=[-200, 300, 0], on_scale=False
         ... )
-        >>> from kinertia.estimation.prepare.prepared import TotalMass
+        >>> from kinertia.estimation.prepared import TotalMass
         >>> TotalMass.of(70.0, [pack])
         TotalMass(body_kg=70.0, total_kg=80.0, sd_kg=0.5)
     """

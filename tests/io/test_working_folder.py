@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from kinertia.errors import FileError
-from kinertia.io.results.working_folder import sole_use
+from kinertia.io.working_folder import sole_use
 
 
 def test_a_second_run_is_told_of_the_first_and_may_come_after_it(tmp_path):
@@ -25,7 +25,7 @@ def test_a_second_run_is_told_of_the_first_and_may_come_after_it(tmp_path):
 def test_what_a_killed_process_held_is_free(tmp_path):
     path = tmp_path / "lock"
     program = (
-        "import sys, time\nfrom pathlib import Path\nfrom kinertia.io.results.working_folder import sole_use\n"
+        "import sys, time\nfrom pathlib import Path\nfrom kinertia.io.working_folder import sole_use\n"
         "with sole_use(Path(sys.argv[1]), 'it'):\n    print('held', flush=True)\n    time.sleep(60)\n"
     )
     with subprocess.Popen([sys.executable, "-c", program, str(path)], stdout=subprocess.PIPE, text=True) as other:

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from kinertia.errors import FileError
-from kinertia.io.results.working_folder import BEFORE, sweep, working_folder
+from kinertia.io.working_folder import BEFORE, sweep, working_folder
 
 GENERATOR = '<meta name="generator" content="kinertia'
 """Tag in the head of every HTML page that is a result of its own."""

@@ -6,7 +6,7 @@ import pytest
 
 from kinertia.diagnostics.result.soundness import mass_from_force_kg
 from kinertia.errors import SettingsError, SubjectError, TrialError
-from kinertia.estimation.prepare.prepared import check_trials, complete_subject
+from kinertia.estimation.prepared import check_trials, complete_subject
 from kinertia.settings import Subject
 from kinertia.trial.data import Markers, Recording
 

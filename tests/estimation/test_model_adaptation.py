@@ -7,9 +7,9 @@ import pytest
 
 import kinertia
 from generic_static import generic_model, smooth_motion
-from kinertia.estimation.prepare import calibration
-from kinertia.estimation.prepare.calibration import AdaptationInputs, first_poses
-from kinertia.estimation.prepare.model_adaptation import show_knee_axes, with_rotating_arms
+from kinertia.estimation import calibration
+from kinertia.estimation.calibration import AdaptationInputs, first_poses
+from kinertia.estimation.model_adaptation import show_knee_axes, with_rotating_arms
 from kinertia.model.gait27 import ARM_ROTATIONS, KNEES, UPPER_ARM_ROTATIONS
 from kinertia.trial.data import FootLoads, Markers, Trial
 

@@ -6,7 +6,7 @@ import textwrap
 
 import pytest
 
-from kinertia.io.results.output_folder import check_folder, complete_folder
+from kinertia.io.output_folder import check_folder, complete_folder
 from result_files import texts_of, write
 
 
@@ -31,7 +31,7 @@ def _process(code, *arguments):
 def test_interruption_while_folders_are_exchanged_waits(tmp_path, name):
     code = """
         import os, signal, sys
-        from kinertia.io.results import output_folder as folder
+        from kinertia.io import output_folder as folder
         number = getattr(signal, sys.argv[2])
         signal.signal(number, lambda number, _: sys.exit(7))
         put = folder.put_in_place
@@ -50,8 +50,8 @@ def test_interruption_while_folders_are_exchanged_waits(tmp_path, name):
 
 KILLED = """
     import os, signal, sys
-    from kinertia.io.results import output_folder as exchange
-    from kinertia.io.results import output_folder as folder
+    from kinertia.io import output_folder as exchange
+    from kinertia.io import output_folder as folder
     exchange._exchanged = lambda one, other: False
     rename, done = os.rename, []
     def renamed(source, target):
@@ -88,7 +88,7 @@ def test_the_folder_of_a_run_at_work_is_not_swept(tmp_path):
 GENERATIONS = """
     import os, random, signal, sys, time
     from pathlib import Path
-    from kinertia.io.results.output_folder import complete_folder
+    from kinertia.io.output_folder import complete_folder
 
     ALSO = (".kinertia.json", "mine.txt")
 

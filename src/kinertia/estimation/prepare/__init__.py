@@ -1,1 +1,0 @@
-"""Prepares what an estimator needs of a person: checked input, calibrated model."""

@@ -1,1 +1,0 @@
-"""Writes folders and archives of results, complete or not at all."""
