@@ -100,8 +100,8 @@ def small_ground(trial: SyntheticTrial, rng: np.random.Generator) -> FootPlates:
     loads = smooth(trial.time, trial.foot_loads.reshape(len(trial.time), 12), 15.0)
     fine = np.linspace(trial.time[0], trial.time[-1], 10 * len(trial.time))
     wrench = 1.1 * loads(fine).reshape(-1, 2, 6) + [1.0, 2.0, 3.0, 1.0, 2.0, 3.0]
-    carriers = (np.stack([np.where(t < SWITCH_S, 0, 2), np.full(len(t), 1)], axis=1) for t in (fine, trial.time))
-    at_samples, at_frames = carriers
+    plate_indices = (np.stack([np.where(t < SWITCH_S, 0, 2), np.full(len(t), 1)], axis=1) for t in (fine, trial.time))
+    at_samples, at_frames = plate_indices
     impact = rng.normal(0.0, 5.0, wrench.shape)
     turn = Rotation.from_euler("y", 90, degrees=True).as_matrix()
     reactions = GroundReactions(
@@ -184,15 +184,15 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
     *floor, angle = static[layout[PLATE_ERRORS]][-3:]
     of_plates = np.add(static[layout[PLATE_ERRORS]][:-3].reshape(-1, 5), [*floor, 0.0, 0.0, angle])
     values = dict(zip(problem.given.plates, of_plates, strict=True))
-    here = np.array([values[name] for name in trial.ground.plates])[trial.ground.carrier]
+    here = np.array([values[name] for name in trial.ground.plates])[trial.ground.plate_index]
     x, z, gain, free_moment, angle = np.moveaxis(here, -1, 0)
     gains = iter(static[layout[GAINS]])
     own_gains = [np.array([next(gains) for _ in each.ground.plates]) for each in problem.trials][k]
-    gain = gain + own_gains[trial.ground.carrier]
+    gain = gain + own_gains[trial.ground.plate_index]
     zeros = iter(static[layout[ZEROS]].reshape(-1, 2))
     own_zeros = [np.array([next(zeros) for _ in each.ground.plates]) for each in problem.trials][k]
-    zero_x, zero_z = np.moveaxis(own_zeros[trial.ground.carrier], -1, 0)
-    middle = trial.ground.middles[trial.ground.carrier]
+    zero_x, zero_z = np.moveaxis(own_zeros[trial.ground.plate_index], -1, 0)
+    middle = trial.ground.middles[trial.ground.plate_index]
     zero = np.stack([zero_x, np.zeros_like(x), zero_z], axis=-1) @ trial.ground.turn.T
     zero *= trial.ground.loaded(trial.time + problem.loads.delay_s(k, static))[..., None]
     loads -= np.concatenate([zero, np.cross(middle, zero)], axis=-1)

@@ -51,13 +51,13 @@ def counted(trial: TrialFit) -> Iterator[Counted]:
             possible = own.known_legs[:, foot] & np.isfinite(k.ik.q[:, columns]).all(axis=1)
             possible[: frames[0]] = possible[frames[-1] + 1 :] = False
             known = np.zeros(len(time), dtype=bool)
-            known[k.course_frames] = _known(trial, side)
+            known[k.trajectory_frames] = _known(trial, side)
             masks = (known, inner, inside)
             yield Counted(side, int(possible.sum()), *(int((possible & mask).sum()) for mask in masks))
 
 
 def _known(trial: TrialFit, side: str) -> np.ndarray:
-    """Return the mask (f,) of `course_frames` in which all moments of a leg are known."""
+    """Return the mask (f,) of `trajectory_frames` in which all moments of a leg are known."""
     assert trial.joint_curves is not None
     joints = trial.joint_curves.joints["estimate"]
     columns = [n for n, name in enumerate(joints.joints) if joint_and_side(name)[1] == side]

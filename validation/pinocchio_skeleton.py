@@ -13,9 +13,9 @@ def pinocchio_model(skeleton: Skeleton, *parts: BodySegmentParameters | None) ->
     """Build the model with these parameters and those of the skeleton; locked axes are part of the placements."""
     model = pin.Model()
     model.gravity.linear = np.array([0.0, -skeleton.gravity_m_s2, 0.0])
-    carrier, offset = {"ground": 0}, {"ground": pin.SE3.Identity()}
+    last_axis, offset = {"ground": 0}, {"ground": pin.SE3.Identity()}
     for joint in skeleton.joints:
-        parent = carrier[joint.parent]
+        parent = last_axis[joint.parent]
         place = offset[joint.parent] * pin.SE3(np.asarray(joint.rotation), np.asarray(joint.translation))
         for axis in joint.axes:
             if axis.coordinate in skeleton.locked:
@@ -25,12 +25,12 @@ def pinocchio_model(skeleton: Skeleton, *parts: BodySegmentParameters | None) ->
             parent = model.addJoint(parent, kind(*axis.direction), place, f"{axis.coordinate}:{model.njoints}")
             place = pin.SE3.Identity()
         far = pin.SE3(np.asarray(joint.child_rotation), np.asarray(joint.child_translation))
-        carrier[joint.child], offset[joint.child] = parent, place * far.inverse()
+        last_axis[joint.child], offset[joint.child] = parent, place * far.inverse()
     for part in (*parts, skeleton.carried):
         for segment, *body in (
             () if part is None else zip(part.segments, part.mass_kg, part.com_m, part.inertia_kgm2, strict=True)
         ):
-            model.appendBodyToJoint(carrier[segment], pin.Inertia(*body), offset[segment])
+            model.appendBodyToJoint(last_axis[segment], pin.Inertia(*body), offset[segment])
     return model
 
 

@@ -25,7 +25,7 @@ from kinertia.estimation.simultaneous.linear_algebra.motion_basis import Bandwid
 from kinertia.estimation.simultaneous.observation import Observations, observe
 from kinertia.estimation.simultaneous.outcome import SimultaneousResult
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
-from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import unlikeness
+from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import mahalanobis_distance
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import inverse_dynamics
@@ -261,7 +261,7 @@ def _again(person: PersonOutcome, group: BspPrior) -> PersonOutcome:
     seen = known(person.information)
     estimate, covariance = with_prior(seen, group)
     sd = np.sqrt(np.diag(covariance)).reshape(-1, 10)
-    unlike = unlikeness(group, estimate, covariance).implausible
+    unlike = mahalanobis_distance(group, estimate, covariance).implausible
     return _compared(person.trial, estimate, group.mean, sd, unlike, seen)
 
 
@@ -290,7 +290,7 @@ def _outcome(
     if np.array_equal(prior.mean.table(), adults.mean.table()):
         information = person_information("", adults, prior, result.bsp, result.bsp_covariance)
     sd = np.sqrt(np.diag(result.bsp_covariance)).reshape(-1, 10)
-    unlike = unlikeness(prior, result.bsp, result.bsp_covariance).implausible
+    unlike = mahalanobis_distance(prior, result.bsp, result.bsp_covariance).implausible
     return _compared(trial, result.bsp, prior.mean, sd, unlike, information)
 
 

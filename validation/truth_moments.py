@@ -81,7 +81,7 @@ def three_dimensional_moments(person: Person, motion: Course, forces: pd.DataFra
     loads = _loads(forces, time)
     rows = []
     for k in range(len(time)):
-        slow, fast = (_velocities(person, course[0][k], course[1][k]) for course in (before, after))
+        slow, fast = (_velocities(person, trajectory[0][k], trajectory[1][k]) for trajectory in (before, after))
         needed = {name: (fast[name] - slow[name]) / (2.0 * _STEP_S) for name in fast}
         person.pose(now[0][k], now[1][k])
         load = {side: wrenches[k] for side, wrenches in loads.items()}

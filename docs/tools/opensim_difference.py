@@ -59,14 +59,14 @@ def rows(case: Case) -> list[str]:
     """Of each exchange: how far it moves the moments, N m RMS."""
     steps, time = moments(case)
 
-    def course(table: pd.DataFrame, name: str) -> np.ndarray:
+    def trajectory(table: pd.DataFrame, name: str) -> np.ndarray:
         return np.concatenate([np.interp(time, table.index, table[f"{name}_{side}_moment"]) for side in "rl"])
 
     tables, lines = list(steps.values()), []
     for title, before, after in zip(list(steps)[1:], tables[:-1], tables[1:], strict=True):
-        rms = [np.sqrt(np.mean((course(after, name) - course(before, name)) ** 2)) for name in MOMENTS]
+        rms = [np.sqrt(np.mean((trajectory(after, name) - trajectory(before, name)) ** 2)) for name in MOMENTS]
         lines.append(f"| {case.title} | {title} | " + " | ".join(f"{value:.1f}" for value in rms) + " |")
-    whole = [np.sqrt(np.mean((course(tables[-1], name) - course(tables[0], name)) ** 2)) for name in MOMENTS]
+    whole = [np.sqrt(np.mean((trajectory(tables[-1], name) - trajectory(tables[0], name)) ** 2)) for name in MOMENTS]
     return [*lines, f"| {case.title} | all together | " + " | ".join(f"{value:.1f}" for value in whole) + " |"]
 
 

@@ -20,7 +20,7 @@ from kinertia.estimation.prior import (
     population_prior,
     with_symmetry,
 )
-from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import unlikeness
+from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import mahalanobis_distance
 from kinertia.model.anthropometry import BodyGeometry, literature_bsp, reference_lengths
 from kinertia.model.bsp import MIRROR_SIGNS, PARAMETERS, BodySegmentParameters
 from kinertia.settings import Instruments, Subject
@@ -314,13 +314,13 @@ def test_bodies_of_a_population_are_possible_and_weigh_the_same(name):
 def test_people_of_the_prior_are_rarely_unlike_it_and_others_are():
     """An estimate that knows everything is the person: squares of the distance are chi-square."""
     rng, exact = np.random.default_rng(0), 1e-6 * PRIOR.covariance
-    people = [unlikeness(PRIOR, PRIOR.draw(rng), exact) for _ in range(200)]
+    people = [mahalanobis_distance(PRIOR, PRIOR.draw(rng), exact) for _ in range(200)]
     assert {one.combinations for one in people} == {120}
     assert np.mean([one.chance < 0.05 for one in people]) < 0.15
     assert np.mean([one.implausible for one in people]) < 0.03
     light = PRIOR.mean.table()
     light[SEGMENTS.index("shank_l"), 0] *= 0.5
-    far = unlikeness(PRIOR, BodySegmentParameters.from_table(SEGMENTS, light), exact)
+    far = mahalanobis_distance(PRIOR, BodySegmentParameters.from_table(SEGMENTS, light), exact)
     assert far.implausible
     assert far.segments[0] == "shank_l"
     assert not far.both_sides
@@ -329,11 +329,13 @@ def test_people_of_the_prior_are_rarely_unlike_it_and_others_are():
     off = PRIOR.mean.table()
     for side in "rl":
         off[SEGMENTS.index(f"shank_{side}"), 1] -= 16.0 * PRIOR.sd[SEGMENTS.index(f"shank_{side}"), 1]
-    joints = unlikeness(PRIOR, BodySegmentParameters.from_table(SEGMENTS, off), exact)
+    joints = mahalanobis_distance(PRIOR, BodySegmentParameters.from_table(SEGMENTS, off), exact)
     assert joints.implausible
     assert joints.both_sides
     assert joints.one_sided is None
-    assert not unlikeness(PRIOR, PRIOR.mean, PRIOR.covariance).implausible, "data that say nothing contradict nothing"
+    assert not mahalanobis_distance(PRIOR, PRIOR.mean, PRIOR.covariance).implausible, (
+        "data that say nothing contradict nothing"
+    )
 
 
 @pytest.mark.slow

@@ -225,9 +225,9 @@ def test_a_leg_needs_its_own_load_only(skeleton, trial):
     assert known[:, rest].all()
     assert rest.sum() > 10
     solved = solve_kinematics(skeleton, partly, 0.0, "gcv")
-    assert len(solved.time) < 100 < len(solved.course_time) == np.ptp(np.flatnonzero(solved.known_frames)) + 1
+    assert len(solved.time) < 100 < len(solved.trajectory_time) == np.ptp(np.flatnonzero(solved.known_frames)) + 1
     pelvis = columns(skeleton, "pelvis")
-    np.testing.assert_array_equal(solved.course_known[:, pelvis].all(axis=1), solved.inside(solved.course_time))
+    np.testing.assert_array_equal(solved.trajectory_known[:, pelvis].all(axis=1), solved.inside(solved.trajectory_time))
 
 
 def test_a_joint_needs_markers_of_what_is_distal_and_of_what_carries_it(skeleton, trial):
@@ -264,9 +264,9 @@ def test_windows_of_a_single_leg_where_contact_is_never_complete(skeleton, trial
     solved = solve_kinematics(skeleton, alone, 0.0, "gcv")
     assert not solved.complete
     assert solved.time[[0, -1]] == pytest.approx([0.40, 1.59])
-    known = solved.course_known
+    known = solved.trajectory_known
     assert not known[:, columns(skeleton, "pelvis")].any()
     assert not known[:, columns(skeleton, "knee_angle_l")].any()
-    inside = solved.inside(solved.course_time)
+    inside = solved.inside(solved.trajectory_time)
     np.testing.assert_array_equal(known[:, columns(skeleton, "knee_angle_r")][:, 0], inside)
     assert solve_kinematics(skeleton, trial, 0.0, "gcv").complete

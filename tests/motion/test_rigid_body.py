@@ -120,11 +120,11 @@ def test_regressor_through_the_axes_is_pinocchios(skeleton, state):
     for k, rows in enumerate(zip(*state[3:], strict=True)):
         expected = pin.computeJointTorqueRegressor(model, data, *rows)
         axes = pin.computeJointJacobians(model, data, rows[0]).T
-        for s, carrier in enumerate(tree.carrier):
+        for s, last_axis in enumerate(tree.last_axis):
             if not np.array_equal(tree.segment_rotation[s], np.eye(3)) or tree.segment_translation[s].any():
                 continue
             ours = np.where(skeleton.support[s][:, None], axes @ shown[k, :, s], 0.0)
-            np.testing.assert_allclose(ours, expected[:, 10 * carrier : 10 * carrier + 10], atol=1e-9)
+            np.testing.assert_allclose(ours, expected[:, 10 * last_axis : 10 * last_axis + 10], atol=1e-9)
 
 
 def test_axes_that_do_not_move_are_left_out(skeleton, state):

@@ -41,7 +41,7 @@ def prolonged(trial, times):
         on_ground=again(kinematics.trial.on_ground, shown),
     )
     curves = trial.joint_curves
-    own = shown - kinematics.course_frames.start
+    own = shown - kinematics.trajectory_frames.start
 
     def parts(one, frames=slice(None)):
         return {name: again(getattr(one, name), frames) for name in vars(one)}

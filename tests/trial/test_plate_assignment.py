@@ -29,7 +29,7 @@ def test_which_plate_a_foot_stands_on():
     for plate, (side, number) in enumerate(ALL_STEPS[2:6], start=2):
         begin = (0.2 if side == "r" else 0.7) + number
         near = (loads.time > begin - 0.15) & (loads.time < begin + 0.75)
-        assert (loads.carrier[near, "rl".index(side)] == plate).all()
+        assert (loads.plate_index[near, "rl".index(side)] == plate).all()
 
 
 def test_a_foot_on_two_plates_counts_for_the_one_that_carries_more():
@@ -43,8 +43,8 @@ def test_a_foot_on_two_plates_counts_for_the_one_that_carries_more():
         declared_feet=(None,) * 3,
     )
     loads, _ = assign_plates(replace(recording, plates=double), FEET)
-    assert (loads.carrier[:, 0] == 0).all()
-    assert (loads.carrier[:, 1] == 2).all()
+    assert (loads.plate_index[:, 0] == 0).all()
+    assert (loads.plate_index[:, 1] == 2).all()
     np.testing.assert_allclose(loads.force[:, 0], recording.plates.force[:, 0])
 
 

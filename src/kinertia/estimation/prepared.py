@@ -239,8 +239,8 @@ def estimated_bodies(skeleton: Skeleton, own: BodySegmentParameters) -> set[str]
     """
     mass = dict(zip(own.segments, own.mass_kg, strict=True))
     groups: dict[int, list[str]] = {}
-    carrier_of = dict(zip(skeleton.segments, skeleton.tree.carrier.tolist(), strict=True))
+    last_axis_of = dict(zip(skeleton.segments, skeleton.tree.last_axis.tolist(), strict=True))
     for name in own.segments:
-        groups.setdefault(carrier_of[name], []).append(name)
+        groups.setdefault(last_axis_of[name], []).append(name)
     heavy = [names for names in groups.values() if sum(mass[name] for name in names) >= LIGHT_KG]
     return {max(names, key=mass.__getitem__) for names in heavy}

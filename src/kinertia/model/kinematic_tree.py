@@ -2,7 +2,7 @@
 
 Every moving axis has a frame of its own, at a fixed position in the frame of the axis before it (its parent), and
 rotates about, or slides along, a fixed direction. Parents come first. A segment is at a fixed position in the frame of
-its carrier, the last axis that moves it. Everything is computed in ground axes.
+the last axis that moves it. Everything is computed in ground axes.
 
 The linear part comes first, then the angular one (Featherstone 2008, ch. 2). A motion (velocity of the body's point at
 the origin, angular velocity) and a force (force, moment about the origin) of all bodies can be summed directly, since
@@ -25,8 +25,8 @@ class KinematicTree(NamedTuple):
         slides: (a,) True for a translation.
         direction: (a, 3) unit, in the axis' frame.
         rotation, translation: (a, 3, 3) and (a, 3) m, the axis' frame in its parent's, at zero.
-        carrier: (s,) index of the last axis that moves each segment; -1 for none.
-        segment_rotation, segment_translation: (s, 3, 3) and (s, 3) m, the segment's frame in its carrier's.
+        last_axis: (s,) index of the last axis that moves each segment; -1 for none.
+        segment_rotation, segment_translation: (s, 3, 3) and (s, 3) m, the segment's frame in its last axis'.
     """
 
     parent: Int1
@@ -34,7 +34,7 @@ class KinematicTree(NamedTuple):
     direction: Float2
     rotation: Float3
     translation: Float2
-    carrier: Int1
+    last_axis: Int1
     segment_rotation: Float3
     segment_translation: Float2
 
@@ -112,8 +112,8 @@ def place_segments(
     translation: np.ndarray,
 ) -> None:
     """Compute the frames of all segments, `rotation` (s, 3, 3) and `translation` (s, 3), from those of the axes."""
-    for s in range(len(tree.carrier)):
-        j = tree.carrier[s]
+    for s in range(len(tree.last_axis)):
+        j = tree.last_axis[s]
         for r in range(3):
             if j < 0:
                 translation[s, r] = tree.segment_translation[s, r]
@@ -134,7 +134,7 @@ def place_segments(
 def poses(tree: KinematicTree, at: Float2) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Compute segment frames (n, s, 3, 3) and (n, s, 3), and axis motions (n, a, 6), at axis values (n, a)."""
     n, a = at.shape
-    s = len(tree.carrier)
+    s = len(tree.last_axis)
     rotation, translation, axes = np.empty((n, s, 3, 3)), np.empty((n, s, 3)), np.empty((n, a, 6))
     axis_rotation, axis_translation = np.empty((a, 3, 3)), np.empty((a, 3))
     for k in range(n):
@@ -147,7 +147,7 @@ def poses(tree: KinematicTree, at: Float2) -> tuple[np.ndarray, np.ndarray, np.n
 def in_segments(tree: KinematicTree, at: Float2, segments: Int1, points: Float3) -> np.ndarray:
     """Convert points (n, m, 3) from ground axes to the frames of their segments (m,), at axis values (n, a)."""
     n, a = at.shape
-    s, result = len(tree.carrier), np.empty(points.shape)
+    s, result = len(tree.last_axis), np.empty(points.shape)
     rotation, translation = np.empty((s, 3, 3)), np.empty((s, 3))
     axis_rotation, axis_translation, axes = np.empty((a, 3, 3)), np.empty((a, 3)), np.empty((a, 6))
     for k in range(n):

@@ -208,9 +208,9 @@ class Skeleton:
     def tree(self) -> KinematicTree:
         """The moving axes and the segments as arrays; locked axes are part of the transforms."""
         parents, kinds, directions, places = [], [], [], []
-        carrier, offset = {"ground": -1}, {"ground": np.eye(4)}
+        last_axis, offset = {"ground": -1}, {"ground": np.eye(4)}
         for joint in self.joints:
-            parent = carrier[joint.parent]
+            parent = last_axis[joint.parent]
             place = offset[joint.parent] @ placed(joint.rotation, joint.translation)
             for axis in joint.axes:
                 if axis.coordinate in self.locked:
@@ -221,7 +221,7 @@ class Skeleton:
                 directions.append(axis.direction)
                 places.append(place)
                 parent, place = len(parents) - 1, np.eye(4)
-            carrier[joint.child] = parent
+            last_axis[joint.child] = parent
             offset[joint.child] = place @ inverse(placed(joint.child_rotation, joint.child_translation))
         at = np.array(places).reshape(-1, 4, 4)
         segments = np.array([offset[segment] for segment in self.segments])
@@ -231,7 +231,7 @@ class Skeleton:
             np.array(directions, dtype=float).reshape(-1, 3),
             np.ascontiguousarray(at[:, :3, :3]),
             np.ascontiguousarray(at[:, :3, 3]),
-            np.array([carrier[segment] for segment in self.segments], dtype=np.int64),
+            np.array([last_axis[segment] for segment in self.segments], dtype=np.int64),
             np.ascontiguousarray(segments[:, :3, :3]),
             np.ascontiguousarray(segments[:, :3, 3]),
         )
@@ -239,9 +239,9 @@ class Skeleton:
     @cached_property
     def support(self) -> np.ndarray:
         """Mask (s, a): True where axis a moves segment s."""
-        carrier = self.tree.carrier
+        last_axis = self.tree.last_axis
         carried = np.vstack([self.above.T, np.zeros((1, len(self.above)), dtype=bool)])
-        result: np.ndarray = carried[carrier]  # the last row is that of segments which no axis moves
+        result: np.ndarray = carried[last_axis]  # the last row is that of segments which no axis moves
         return result
 
     @cached_property
@@ -270,7 +270,7 @@ class Skeleton:
         """Last axis (m,) that moves each marker, and the markers (m, 3) m in the frames of these axes."""
         tree, segment = self.tree, self.marker_segments
         turned = (tree.segment_rotation[segment] @ self.marker_locals[:, :, None])[..., 0]
-        return tree.carrier[segment], np.ascontiguousarray(turned + tree.segment_translation[segment])
+        return tree.last_axis[segment], np.ascontiguousarray(turned + tree.segment_translation[segment])
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -293,14 +293,14 @@ class Skeleton:
         for part in (bsp, self.carried):
             if part is not None:
                 rows = np.array([self.segments.index(segment) for segment in part.segments])
-                carrier = self.tree.carrier[rows]
+                last_axis = self.tree.last_axis[rows]
                 own = (self._parameter_places[rows] @ part.dynamic_parameters().reshape(-1, 10, 1))[..., 0]
-                np.add.at(total, carrier[carrier >= 0], own[carrier >= 0])
+                np.add.at(total, last_axis[last_axis >= 0], own[last_axis >= 0])
         return total
 
     @cached_property
     def _parameter_places(self) -> np.ndarray:
-        """Matrices (s, 10, 10) from dynamic parameters of each segment to those in its carrier's frame."""
+        """Matrices (s, 10, 10) from dynamic parameters of each segment to those in the frame of its last axis."""
         tree = self.tree
         return transformed_parameters(np.array([*map(placed, tree.segment_rotation, tree.segment_translation)]))
 

@@ -168,7 +168,7 @@ def regressor(tree: KinematicTree, gravity_m_s2: float, x: Float2, v: Float2, a:
     require the force m b + e x h + w x (w x h) and, about the segment's origin, the moment h x b + I e + w x (I w).
     """
     n, count = x.shape
-    segments = len(tree.carrier)
+    segments = len(tree.last_axis)
     result = np.zeros((n, 6, segments, 10))
     frame = empty_frame(count, gravity_m_s2)
     rotation, translation = np.empty((segments, 3, 3)), np.empty((segments, 3))
@@ -177,10 +177,10 @@ def regressor(tree: KinematicTree, gravity_m_s2: float, x: Float2, v: Float2, a:
         move(tree, x[k], v[k], a[k], frame)
         place_segments(tree, frame.rotation, frame.translation, rotation, translation)
         for s in range(segments):
-            carrier = tree.carrier[s]
-            if carrier < 0:
+            last_axis = tree.last_axis[s]
+            if last_axis < 0:
                 continue
-            in_segment(frame.velocity[carrier], frame.acceleration[carrier], rotation[s], translation[s], w, e, b)
+            in_segment(frame.velocity[last_axis], frame.acceleration[last_axis], rotation[s], translation[s], w, e, b)
             own_regressor(w, e, b, own)
             to_ground(rotation[s], translation[s], about[k], own, result[k, :, s])
     return result

@@ -70,7 +70,7 @@ class GroundReactions:
     Attributes:
         time: (k,) s.
         wrench: (k, 2, 6) on right and left foot: force (N), moment about the ground origin (N m), ground axes.
-        carrier: (k, 2) index of the plate that each foot stands on, among those of the trial's `FootLoads`.
+        plate_index: (k, 2) index of the plate that each foot stands on, among those of the trial's `FootLoads`.
         impact: (k, 2, 6) part that motion cannot follow, whether it was subtracted or not: joint moments are uncertain
             by its effect, since the corresponding acceleration is missing.
         cutoff_hz: low-pass cutoff of the forces; None: as the plates gave them.
@@ -82,7 +82,7 @@ class GroundReactions:
 
     time: np.ndarray
     wrench: np.ndarray
-    carrier: np.ndarray
+    plate_index: np.ndarray
     impact: np.ndarray
     cutoff_hz: float | None
     noise_n: float = 0.0
@@ -163,7 +163,7 @@ def measured_reactions(kinematics: Kinematics) -> GroundReactions:
     noise_n = _noise_left(loads.noise_n, rate_hz, cutoff_hz)
     blurred = _blurred(time, wrench, load_bandwidth_hz(loads.time, loads.wrench[..., 1]))
     return GroundReactions(
-        time, wrench, loads.carrier[near], np.zeros(wrench.shape), cutoff_hz, noise_n, blurred=blurred
+        time, wrench, loads.plate_index[near], np.zeros(wrench.shape), cutoff_hz, noise_n, blurred=blurred
     )
 
 

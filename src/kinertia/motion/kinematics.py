@@ -101,29 +101,29 @@ class Kinematics:
         return result
 
     @cached_property
-    def course_frames(self) -> slice:
+    def trajectory_frames(self) -> slice:
         """The f marker frames from the first to the last one in `known_frames`."""
         frames = np.flatnonzero(self.known_frames)
         return slice(int(frames[0]), int(frames[-1]) + 1)
 
     @property
-    def course_time(self) -> np.ndarray:
-        """Times (f,) s of `course_frames`."""
-        return self.trial.markers.time[self.course_frames]
+    def trajectory_time(self) -> np.ndarray:
+        """Times (f,) s of `trajectory_frames`."""
+        return self.trial.markers.time[self.trajectory_frames]
 
     @property
-    def course_known(self) -> np.ndarray:
-        """Mask (f, c) of `course_frames` in which the generalised force of each coordinate is known."""
-        inside = self.inside(self.course_time)[:, None] & self.complete
+    def trajectory_known(self) -> np.ndarray:
+        """Mask (f, c) of `trajectory_frames` in which the generalised force of each coordinate is known."""
+        inside = self.inside(self.trajectory_time)[:, None] & self.complete
         if self.known is None:
             return np.repeat(inside, len(self.ik.coordinates), axis=1)
-        result: np.ndarray = self.known[self.course_frames] | inside
+        result: np.ndarray = self.known[self.trajectory_frames] | inside
         return result
 
     @cached_property
     def span_s(self) -> tuple[float, float]:
-        """First and last time of the samples that determine the motion: of `course_frames` and somewhat around them."""
-        (start, end), own = self.window_s, self.course_time
+        """First and last time of the samples that determine the motion: of `trajectory_frames` and around them."""
+        (start, end), own = self.window_s, self.trajectory_time
         ends_s = END_PERIODS / self.cutoff_hz
         first, last = min(start - AROUND_WINDOW_S, own[0] - ends_s), max(end + AROUND_WINDOW_S, own[-1] + ends_s)
         return float(first), float(last)

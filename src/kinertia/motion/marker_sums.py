@@ -82,7 +82,7 @@ def normal_equations(
     owner: Int1,
     slopes: Float2,
     at: Float2,
-    carrier: Int1,
+    last_axis: Int1,
     local: Float2,
     measured: Float3,
     count: int,
@@ -94,7 +94,7 @@ def normal_equations(
         owner: (a,) the coordinate of each axis.
         slopes: (n, a) derivatives of the axes by their coordinates.
         at: (n, a) values of the axes, rad or m.
-        carrier: (m,) the last axis that moves each marker.
+        last_axis: (m,) the last axis that moves each marker.
         local: (m, 3) m, the markers in the frames of these axes.
         measured: (n, m, 3) m; NaN where not seen.
         count: number of coordinates, c.
@@ -107,8 +107,8 @@ def normal_equations(
         place_axes(tree, at[k], rotation, translation, axes)
         sums[:] = 0.0
         forces[:] = 0.0
-        for m in range(len(carrier)):
-            j = carrier[m]
+        for m in range(len(last_axis)):
+            j = last_axis[m]
             place_marker(rotation[j], translation[j], local[m], x)
             for i in range(3):
                 r[i] = measured[k, m, i] - x[i]

@@ -153,10 +153,10 @@ def _steps(
 def normal_equations(model: Skeleton, measured: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Compute J^T J (n, c, c), J^T r (n, c) and r^T r (n,) of the visible markers (n, m, 3); r = measured - model."""
     tree, axes = model.tree, model.map
-    carrier, local = model.carried_markers
+    last_axis, local = model.carried_markers
     at, slopes = axes.places_and_slopes(q)
     return marker_sums.normal_equations(
-        tree, axes.owner, slopes, at, carrier, local, np.ascontiguousarray(measured), axes.count
+        tree, axes.owner, slopes, at, last_axis, local, np.ascontiguousarray(measured), axes.count
     )
 
 

@@ -262,8 +262,8 @@ def run_variants(
         for number in range(repeats * variant.times)
     ]
     draws: dict[str, list[Draw]] = {title: [] for title in variants}
-    courses = in_parallel(_draw, [case for _, case in cases], progress=progress)
-    for (title, _), draw in zip(cases, courses, strict=True):
+    results = in_parallel(_draw, [case for _, case in cases], progress=progress)
+    for (title, _), draw in zip(cases, results, strict=True):
         draws[title].append(draw)
     tables = {}
     for title, trial in trials.items():

@@ -292,7 +292,7 @@ class FootLoads:
             _expect_shape("on_plate", self.on_plate, shape[:2])
 
     @property
-    def carrier(self) -> npt.NDArray[np.int_]:
+    def plate_index(self) -> npt.NDArray[np.int_]:
         """Index (k, 2) of the plate that each foot stands on."""
         return np.tile([0, 1], (len(self.time), 1)) if self.on_plate is None else self.on_plate
 

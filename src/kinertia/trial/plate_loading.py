@@ -129,19 +129,19 @@ def _loaded(time: FloatArray, vertical: FloatArray, unloaded: UnloadedReading) -
     """Return the mask (k,) of samples whose vertical force (k,) exceeds the reading of the unloaded plate."""
     if np.isnan(unloaded.noise_n):
         return vertical >= load_threshold_n(vertical)
-    course = vertical - unloaded.remaining_n[1]
+    level = vertical - unloaded.remaining_n[1]
     if unloaded.noise_n > _NOISY_N:
-        period = min(max(1, round(_MAINS_S / float(np.median(np.diff(time))))), len(course))
-        mean = np.convolve(course, np.full(period, 1.0 / period), mode="valid")
-        course = mean[np.clip(np.arange(len(course)) - period // 2, 0, len(mean) - 1)]
-    blocks = course[unloaded_blocks(time, vertical)]
+        period = min(max(1, round(_MAINS_S / float(np.median(np.diff(time))))), len(level))
+        mean = np.convolve(level, np.full(period, 1.0 / period), mode="valid")
+        level = mean[np.clip(np.arange(len(level)) - period // 2, 0, len(mean) - 1)]
+    blocks = level[unloaded_blocks(time, vertical)]
     usual = np.abs(blocks[np.abs(blocks.mean(axis=1)) < _WANDERS_N])
     beyond_n = _BEYOND_IDLE * float(np.percentile(usual, _IDLE_PERCENT)) if usual.size else 0.0
     threshold_n = max(LOAD_THRESHOLD_N - unloaded.remaining_n[1], LOAD_THRESHOLD_N / 2, beyond_n)
-    loaded = course >= threshold_n
+    loaded = level >= threshold_n
     if beyond_n >= threshold_n:
         for first, last in runs(loaded):
-            loaded[first : last + 1] &= course[first : last + 1].max() >= _STEP_BEYOND * threshold_n
+            loaded[first : last + 1] &= level[first : last + 1].max() >= _STEP_BEYOND * threshold_n
     return loaded
 
 

@@ -197,15 +197,17 @@ def _simultaneous(
     parts = (
         fitted.skeletons,
         fitted.motions,
-        fitted.courses,
+        fitted.trajectories,
         bandwidths,
         fitted.foot_loads,
         result.reactions,
         fitted.deviations,
     )
     estimates = [
-        _Estimated(skeleton, motion, course, bandwidth.motion_hz, loads, reactions, measured_reactions(k), sd)
-        for skeleton, motion, course, bandwidth, loads, reactions, sd, k in zip(*parts, ready.kinematics, strict=True)
+        _Estimated(skeleton, motion, trajectory, bandwidth.motion_hz, loads, reactions, measured_reactions(k), sd)
+        for skeleton, motion, trajectory, bandwidth, loads, reactions, sd, k in zip(
+            *parts, ready.kinematics, strict=True
+        )
     ]
     trials = _trial_fits(ready, fitted.bsp, estimates, started)
     return _Outcome(fitted.skeleton, fitted.bsp, trials, result.converged, fitted.posterior)
@@ -218,16 +220,16 @@ class _Estimated:
     Attributes:
         skeleton: skeleton with the markers at their positions in this trial.
         motion: motion in the measured frames.
-        course: (f, c) coordinates, as in `TrialFit`; None after two-level.
+        trajectory: (f, c) coordinates, as in `TrialFit`; None after two-level.
         motion_hz: bandwidth of the motion.
         foot_loads: (w, 2, 6) at the motion's bandwidth.
         reactions, before: ground reactions for the joint moments after and before the estimate.
-        deviations: SDs of the curves at the frames of `course`, or None.
+        deviations: SDs of the curves at the frames of `trajectory`, or None.
     """
 
     skeleton: Skeleton
     motion: Motion
-    course: np.ndarray | None
+    trajectory: np.ndarray | None
     motion_hz: float
     foot_loads: np.ndarray
     reactions: GroundReactions
@@ -264,10 +266,10 @@ def _trial_fit(
         "corrected": (before, literature, corrected),
     }
     measured, delivered = (loads.at(k.time) for loads in (after.before, after.reactions))
-    course = None if after.course is None else _interpolated(k.course_time, after.course)
-    inner = k.frames - k.course_frames.start
-    motion = _by_windows(k, after.motion) if course is None else course.cut(inner)
-    curves = None if course is None else _joint_curves(before, literature, k, bsp, after, course)
+    trajectory = None if after.trajectory is None else _interpolated(k.trajectory_time, after.trajectory)
+    inner = k.frames - k.trajectory_frames.start
+    motion = _by_windows(k, after.motion) if trajectory is None else trajectory.cut(inner)
+    curves = None if trajectory is None else _joint_curves(before, literature, k, bsp, after, trajectory)
     narrow = {name: residual(*stage, wrench) for name, stage in stages.items()}
     narrow["estimate"] = residual(after.skeleton, bsp, after.motion, after.foot_loads.sum(axis=1))
     full = {name: residual(*stage, measured.sum(axis=1)) for name, stage in stages.items()}
@@ -284,7 +286,7 @@ def _trial_fit(
         kinematics=k,
         skeleton=after.skeleton,
         motion=motion,
-        course=after.course,
+        trajectory=after.trajectory,
         motion_hz=after.motion_hz,
         reactions=after.reactions,
         residuals=narrow,
@@ -306,15 +308,15 @@ def _joint_curves(
     k: Kinematics,
     bsp: BodySegmentParameters,
     after: _Estimated,
-    course: Motion,
+    trajectory: Motion,
 ) -> JointCurves:
     """Return the joint loads wherever they are known, before and after the estimate."""
-    smoothed = Motion(*(k.spline(k.course_time, order) for order in range(3)))
+    smoothed = Motion(*(k.spline(k.trajectory_time, order) for order in range(3)))
     stages = {
         "literature": (before, literature, smoothed, after.before),
-        "estimate": (after.skeleton, bsp, course, after.reactions),
+        "estimate": (after.skeleton, bsp, trajectory, after.reactions),
     }
-    return JointCurves.of(k, course, stages, after.deviations)
+    return JointCurves.of(k, trajectory, stages, after.deviations)
 
 
 def _by_windows(k: Kinematics, motion: Motion) -> Motion:

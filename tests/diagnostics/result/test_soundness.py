@@ -10,7 +10,7 @@ from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.soundness import attached_items, forces_of_the_motion, soundness, total_mass
 from kinertia.diagnostics.runner import explained
 from kinertia.estimation.prepared import TotalMass
-from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import OneSided, Unlikeness
+from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import MahalanobisDistance, OneSided
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.settings import Attached
 from kinertia.synthetic.walk import walking_subject
@@ -29,7 +29,7 @@ def found(posterior=None, **changes):
         "literature": BODY,
         "posterior": None
         if posterior is None
-        else SimpleNamespace(**{"unlikeness": None, "iterations": 7, **posterior}),
+        else SimpleNamespace(**{"mahalanobis_distance": None, "iterations": 7, **posterior}),
         "file": None,
         "expected": changes.get("literature", BODY),
         "more_known": False,
@@ -120,9 +120,9 @@ def test_more_than_two_doubted_segments_contradict_the_model(doubted, expected):
 
 def unlike(both_sides=False, one_sided=None, away=0.0):
     """Findings of a person unlike the prior, and those that no other explains."""
-    whole = Unlikeness(60.0, 12, 1e-9, ("tibia_l", "torso"), both_sides, one_sided)
+    whole = MahalanobisDistance(60.0, 12, 1e-9, ("tibia_l", "torso"), both_sides, one_sided)
     estimate = BodySegmentParameters.from_table(BODY.segments, BODY.table() + away * 0.01 * np.eye(2, 10))
-    answers = explained(found({"prior_sd": np.full((2, 10), 0.01), "unlikeness": whole}, estimate=estimate))
+    answers = explained(found({"prior_sd": np.full((2, 10), 0.01), "mahalanobis_distance": whole}, estimate=estimate))
     return [one for one in answers if one.is_open]
 
 

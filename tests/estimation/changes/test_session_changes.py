@@ -82,13 +82,13 @@ def test_a_changed_knee_is_found(sessions):
     column = after.skeleton.coordinates.index("knee_angle_r")
     bent = []
     for one in after.trials:
-        course = one.course.copy()
-        course[:, column] -= np.radians(20.0)
+        trajectory = one.trajectory.copy()
+        trajectory[:, column] -= np.radians(20.0)
         curves = one.joint_curves
         q = curves.motion.q.copy()
         q[:, column] -= np.radians(20.0)
         motion = replace(curves.motion, q=q)
-        bent.append(replace(one, course=course, joint_curves=replace(curves, motion=motion)))
+        bent.append(replace(one, trajectory=trajectory, joint_curves=replace(curves, motion=motion)))
     found = compared(before, replace(after, trials=tuple(bent)))
     knee = [one for one in found if (one.quantity, one.joint, one.side) == ("angle", "knee", "r")]
     assert {one.verdict for one in knee} == {"changed"}

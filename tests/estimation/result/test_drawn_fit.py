@@ -98,7 +98,7 @@ def test_a_saved_fit_draws_the_same(fit, drawn, tmp_path):
     write_fit(fit, None, tmp_path / "fit.npz")
     again = drawn_fit(load_fit(tmp_path), 4)
     np.testing.assert_array_equal(again.estimate.table(), drawn[4].estimate.table())
-    np.testing.assert_array_equal(again.trials[0].course, drawn[4].trials[0].course)
+    np.testing.assert_array_equal(again.trials[0].trajectory, drawn[4].trials[0].trajectory)
 
 
 def test_kept_draws_are_bounded():
@@ -169,7 +169,7 @@ def test_opensim_finds_the_reported_deviations_on_all_draws(opensim, fit, tmp_pa
     for folder in folders:
         files = folder / "model.osim", folder / "kinematics.mot", folder / "external_loads.xml"
         moments.append(inverse_dynamics_tool(opensim, *files, folder)[columns].to_numpy())
-    start = int(np.argmin(np.abs(trial.kinematics.course_time - trial.time[0])))
+    start = int(np.argmin(np.abs(trial.kinematics.trajectory_time - trial.time[0])))
     found = np.array(moments)[:, start : start + len(trial.time)]
     ratio = spread_over_reported(found, trial)
     np.testing.assert_allclose(ratio, 1.0, atol=SYSTEMATIC + sampling(count))
@@ -206,20 +206,20 @@ def test_drawn_errors_of_plates_are_added_to_the_estimated_ones():
     rng = np.random.default_rng(3)
     recorded, standing = rng.normal(0.0, 300.0, (20, 2, 6)), np.ones((20, 2))
     recorded[..., 1] = 700.0
-    carrier = np.tile([0, 1], (20, 1))
+    plate_index = np.tile([0, 1], (20, 1))
     shared = np.array([[0.2, 0.0, 0.3], [0.9, 0.0, 0.3]]), np.eye(3)
     gain, departure = np.array([0.08, -0.05]), np.array([0.03, 0.02])
 
     def corrected(gains):
         errors = np.zeros((2, 7))
         errors[:, GAIN] = gains
-        return corrected_loads(recorded, standing, carrier, errors, *shared)
+        return corrected_loads(recorded, standing, plate_index, errors, *shared)
 
     plates = np.zeros((1, 2, 7))
     plates[0, :, GAIN] = departure
     nothing = np.zeros(0), np.zeros((1, 0, 0))
     draws = TrialDraws(*nothing, plates, gain, *shared, np.array([0.004]), np.zeros(1))
-    estimate = GroundReactions(np.arange(20) / 100, corrected(gain), carrier, np.zeros((20, 2, 6)), None)
+    estimate = GroundReactions(np.arange(20) / 100, corrected(gain), plate_index, np.zeros((20, 2, 6)), None)
     drawn = _reactions(estimate, draws, 0)
     np.testing.assert_allclose(drawn.wrench, corrected(gain + departure), rtol=1e-12)
     assert np.abs(drawn.wrench - estimate.wrench).max() > 10.0

@@ -39,7 +39,7 @@ def test_only_known_moments_count(fit, side, foot):
     k, curves = trial.kinematics, trial.joint_curves
     own = curves.joints["estimate"].joints.index(f"hip_{side}")
     known = np.isfinite(curves.joints["estimate"].moments[:, own, 0])
-    ground = k.trial.on_ground[k.course_frames, foot]
+    ground = k.trial.on_ground[k.trajectory_frames, foot]
     stance = np.flatnonzero(known & ground)
     late = k.trial.markers.time > curves.time[stance[3 * len(stance) // 4]]
     cut = replace(k, known=k.known & ~late[:, None], windows_s=((-2.0, -1.0),))

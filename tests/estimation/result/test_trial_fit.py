@@ -21,7 +21,7 @@ def result(request, fit_of):
 
 def test_they_are_those_of_the_measured_windows_there(result):
     _, trial = result
-    curves, inner = trial.joint_curves, trial.kinematics.frames - trial.kinematics.course_frames.start
+    curves, inner = trial.joint_curves, trial.kinematics.frames - trial.kinematics.trajectory_frames.start
     np.testing.assert_allclose(curves.time[inner], trial.time)
     for stage in ("literature", "estimate"):
         np.testing.assert_allclose(curves.forces[stage][inner], trial.joint_loads[stage], rtol=1e-9, atol=1e-9)
@@ -42,7 +42,7 @@ def test_a_number_has_an_error_bar_and_what_is_not_known_has_none(result):
     # a leg is known longer than both together are
     knees = [found[:, curves.joints["estimate"].joints.index(f"knee_{side}"), 0] for side in "rl"]
     assert min(knee.sum() for knee in knees) > 1.1 * len(trial.time)
-    legs = trial.kinematics.trial.known_legs[trial.kinematics.course_frames]
+    legs = trial.kinematics.trial.known_legs[trial.kinematics.trajectory_frames]
     for foot, knee in enumerate(knees):
         assert not knee[~legs[:, foot]].any()
 

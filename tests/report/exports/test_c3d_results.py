@@ -222,7 +222,7 @@ def test_measured_files_come_back_with_vicons_signs(fit_of, tmp_path, name):
     path = tmp_path / "out" / find(walk).name
     points, at = expect_outputs(path, fit, "Kinertia" if own_outputs else "")
     kinematics = fit.trials[0].kinematics
-    at = at[kinematics.frames - kinematics.course_frames.start]
+    at = at[kinematics.frames - kinematics.trajectory_frames.start]
     before, file = points_of(find(walk))
     rate_hz = file["header"]["points"]["frame_rate"]
     for label, values in before.items():

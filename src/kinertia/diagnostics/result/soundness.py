@@ -13,7 +13,7 @@ from kinertia.diagnostics.runner import check
 from kinertia.estimation.prepared import mass_by_force_kg
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.trial_fit import TrialFit
-from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import UNLIKE_CHANCE, OneSided, Unlikeness
+from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import UNLIKE_CHANCE, MahalanobisDistance, OneSided
 from kinertia.findings.display import first_few
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Limit, Quantity, Where
@@ -65,7 +65,7 @@ def soundness(context: ResultContext) -> Iterator[Finding]:
         yield finding("R201", iterations=Quantity(steps, "1"))
     yield from _impossible(fit)
     yield from _far_centres(fit) if fit.posterior is None else _far_parameters(fit)
-    whole = None if fit.posterior is None else fit.posterior.unlikeness
+    whole = None if fit.posterior is None else fit.posterior.mahalanobis_distance
     if whole is not None and whole.implausible:
         yield _unlike(whole) if whole.one_sided is None else _side_heavier(whole.one_sided)
 
@@ -141,7 +141,7 @@ def _far_centres(fit: Fit) -> Iterator[Finding]:
         )
 
 
-def _unlike(whole: Unlikeness) -> Finding:
+def _unlike(whole: MahalanobisDistance) -> Finding:
     """Report R204: the likeliest causes first: wrong joint centres affect both sides equally, a prosthesis does not."""
     wrong_first = (f"{_WRONG}: left and right deviate equally", _WORN, _OTHER)
     causes = wrong_first if whole.both_sides else (_WORN, _OTHER, _WRONG)

@@ -238,12 +238,12 @@ def _speeds(trial: TrialFit) -> np.ndarray:
     """Return the speed of each stride, m/s; without strides that of the pelvis; empty where neither shows it."""
     all_strides = np.array(spatiotemporal_columns([trial])["speed_m_s"], dtype=float)
     strides: np.ndarray = all_strides[np.isfinite(all_strides)]
-    if strides.size or trial.kinematics.trial.belt is not None or trial.course is None:
+    if strides.size or trial.kinematics.trial.belt is not None or trial.trajectory is None:
         return strides
-    time = trial.kinematics.course_time
+    time = trial.kinematics.trajectory_time
     lasted = float(time[-1] - time[0])
     if lasted < _SHORTEST_S:
         return strides
-    first, last = trial.skeleton.root.centre(trial.course[[0, -1]])[:, [0, 2]]
+    first, last = trial.skeleton.root.centre(trial.trajectory[[0, -1]])[:, [0, 2]]
     speed = float(np.linalg.norm(last - first)) / lasted
     return np.array([speed] if speed > _STANDING_M_S else [])

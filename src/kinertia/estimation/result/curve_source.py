@@ -78,7 +78,7 @@ class CurveSource:
     def __init__(self, trial: Estimated, stage: Stage) -> None:
         self.kinematics, self.stage, curves = trial.kinematics, stage, trial.joint_curves
         k = trial.kinematics
-        time, inner = k.course_time, k.frames - k.course_frames.start
+        time, inner = k.trajectory_time, k.frames - k.trajectory_frames.start
         self.reactions = trial.reactions.whole if stage == "estimate" else measured_reactions(k)
         deviations = trial.deviations if stage == "estimate" else None
         if curves is None:
@@ -89,7 +89,7 @@ class CurveSource:
         else:
             shown = np.logical_or.reduce(curves.known, axis=1, keepdims=True)
             q, loads = np.where(shown, curves.motion.q, np.nan), curves.forces[stage]
-            legs = k.trial.known_legs[k.course_frames] & shown
+            legs = k.trial.known_legs[k.trajectory_frames] & shown
             spread = None if deviations is None else curves.deviations
             joints = curves.joints[stage].moments if stage in curves.joints else np.empty((len(time), 0, 3))
         self._time, self._angles, self._loads, self._joints = time, q, loads, joints

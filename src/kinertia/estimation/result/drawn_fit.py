@@ -53,7 +53,7 @@ def drawn_fit(fit: Fit, number: int, knees: bool = True) -> Fit:
 
     Body segment parameters, joint centres, marker positions, coordinates, ground reactions and the joint moments that
     follow from them all belong to one draw. Of `Fit` and `TrialFit` only these differ: `estimate`, `skeleton`, and
-    each trial's `skeleton`, `motion`, `course`, `reactions`, `joint_loads["estimate"]` and `joint_curves`.
+    each trial's `skeleton`, `motion`, `trajectory`, `reactions`, `joint_loads["estimate"]` and `joint_curves`.
 
     Args:
         fit: by the simultaneous estimate.
@@ -94,11 +94,11 @@ def _trial(
 ) -> TrialFit:
     skeleton, bsp = model
     k, in_trial = trial.kinematics, trial.skeleton.marker_locals - fit.skeleton.marker_locals
-    time, course = (k.time, trial.motion.q) if trial.course is None else (k.course_time, trial.course)
-    course = course + BSpline(draws.knots, draws.coefficients[number].astype(float), _DEGREE)(time)
-    spline = interpolate(time, course)
+    time, trajectory = (k.time, trial.motion.q) if trial.trajectory is None else (k.trajectory_time, trial.trajectory)
+    trajectory = trajectory + BSpline(draws.knots, draws.coefficients[number].astype(float), _DEGREE)(time)
+    spline = interpolate(time, trajectory)
     moved = Motion(*(spline(time, order) for order in range(3)))
-    motion = moved if trial.course is None else moved.cut(k.frames - k.course_frames.start)
+    motion = moved if trial.trajectory is None else moved.cut(k.frames - k.trajectory_frames.start)
     reactions = _reactions(trial.reactions, draws, number)
     own = skeleton.with_positions(skeleton.marker_locals + in_trial)
     curves = trial.joint_curves
@@ -110,7 +110,7 @@ def _trial(
         trial,
         skeleton=own,
         motion=motion,
-        course=course,
+        trajectory=trajectory,
         reactions=reactions,
         joint_loads={**trial.joint_loads, "estimate": loads},
         deviations=None,
@@ -126,7 +126,7 @@ def _reactions(estimate: GroundReactions, draws: TrialDraws, number: int) -> Gro
     departures = draws.plates[number].copy()
     departures[:, GAIN] /= 1.0 + draws.plate_gain
     standing = np.ascontiguousarray(estimate.loaded)
-    shared = estimate.carrier, departures, np.ascontiguousarray(draws.middles), np.ascontiguousarray(draws.turn)
+    shared = estimate.plate_index, departures, np.ascontiguousarray(draws.middles), np.ascontiguousarray(draws.turn)
     impact = corrected_loads(estimate.impact, np.zeros_like(standing), *shared)
     wrench = corrected_loads(estimate.wrench, standing, *shared) + draws.impact[number] * (impact + estimate.blurred)
     return replace(estimate, time=estimate.time - draws.delay_s[number], wrench=wrench, impact=impact)

@@ -107,7 +107,7 @@ def gaps_sentence(trials: Sequence[Estimated]) -> str:
 
 def _gaps(trial: Estimated) -> Iterator[MomentGap]:
     k = trial.kinematics
-    time, loads, own = k.trial.markers.time, k.trial.loads, k.course_frames
+    time, loads, own = k.trial.markers.time, k.trial.loads, k.trajectory_frames
     nearest = nearest_samples(loads.time, time)
     loaded = loads.force[nearest, :, 1] >= LOAD_THRESHOLD_N
     shared = np.zeros(len(time), dtype=bool) if loads.on_shared_plate is None else loads.on_shared_plate[nearest]

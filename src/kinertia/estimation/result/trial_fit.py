@@ -30,12 +30,12 @@ if TYPE_CHECKING:
 
 
 Stage: TypeAlias = tuple[Skeleton, BodySegmentParameters, Motion, GroundReactions]
-"""What joint loads are computed from: motion at the frames of `Kinematics.course_time`."""
+"""What joint loads are computed from: motion at the frames of `Kinematics.trajectory_time`."""
 
 
 @dataclass(frozen=True, eq=False)
 class JointCurves:
-    """Motion and joint loads at the f frames of `Kinematics.course_time`.
+    """Motion and joint loads at the f frames of `Kinematics.trajectory_time`.
 
     Attributes:
         time: (f,) s.
@@ -82,11 +82,11 @@ class JointCurves:
 
         Args:
             kinematics: of the trial.
-            motion: estimated, at the frames of `course_time`.
+            motion: estimated, at the frames of `trajectory_time`.
             stages: skeleton, parameters, motion at these frames and ground reactions of each.
             deviations: standard deviations at these frames.
         """
-        time, known = kinematics.course_time, kinematics.course_known
+        time, known = kinematics.trajectory_time, kinematics.trajectory_known
         forces, joints = {}, {}
         for name, (skeleton, bsp, moved, reactions) in stages.items():
             loads, own = reactions.at(time), known_joints(skeleton, known)
@@ -145,8 +145,8 @@ class TrialFit:
         motion: estimated coordinates (rad, m), and their derivatives as OpenSim's tools compute them from
             `kinematics.mot`, by natural quintic splines through the frames. They differ from the estimate's own in the
             first and last frames only.
-        course: (f, c) coordinates of `kinematics.course_time`: all frames in which any joint's load is known, and
-            those between; None after two-level, which has none there.
+        trajectory: (f, c) coordinates of `kinematics.trajectory_time`: all frames in which any joint's load is known,
+            and those between; None after two-level, which has none there.
         motion_hz: bandwidth of the motion.
         reactions: the corresponding ground reactions at the plates' rate, corrected for instrument errors.
         residuals: root residual (w, 6: force N, moment N m about the pelvis origin, ground axes) per stage:
@@ -161,7 +161,7 @@ class TrialFit:
             `moment_sd` return them as tables.
         marker_errors_m: distances (w, m) between measured and model markers per stage: "ik", "final".
         seconds: computing time per stage.
-        joint_curves: joint loads in three dimensions at the frames of `course`, wherever they are known; None after
+        joint_curves: joint loads in three dimensions at the frames of `trajectory`, wherever they are known; None after
             two-level and in older files.
 
     Examples:
@@ -181,7 +181,7 @@ class TrialFit:
     deviations: CurveDeviations | None
     marker_errors_m: Mapping[str, np.ndarray]
     seconds: Mapping[str, float]
-    course: np.ndarray | None = None
+    trajectory: np.ndarray | None = None
     joint_curves: JointCurves | None = None
 
     @property

@@ -25,7 +25,7 @@ from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveD
 from kinertia.estimation.simultaneous.uncertainty.evidence import FreeMomentSign, MissingLoad
 from kinertia.estimation.simultaneous.uncertainty.model_errors import placement
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import PosteriorDraws
-from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import Unlikeness, unlikeness
+from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import MahalanobisDistance, mahalanobis_distance
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.gait27 import VIRTUAL_TRUNK
 from kinertia.model.skeleton import Skeleton
@@ -53,7 +53,7 @@ class Posterior:
         base: combinations of parameters that these motions determine, and those that no motion determines.
         instruments: information of these trials on plates and synchronisation.
         prior_mean: of the body segment parameters; None in older files, which lack it.
-        unlikeness: distance of the estimate from the prior; None in older files.
+        mahalanobis_distance: distance of the estimate from the prior; None in older files.
         free_moment_sign: evidence on the sign; None if it was not tested.
         marker_distances_m: per trial, distance of each marker from its position in the nearest of the other trials, for
             markers that other trials have.
@@ -75,7 +75,7 @@ class Posterior:
     base: BaseParameters
     instruments: InstrumentInformation
     prior_mean: BodySegmentParameters | None = None
-    unlikeness: Unlikeness | None = None
+    mahalanobis_distance: MahalanobisDistance | None = None
     free_moment_sign: FreeMomentSign | None = None
     marker_distances_m: tuple[Mapping[str, float], ...] = field(default=())
     down_weighted: tuple[float, ...] = ()
@@ -105,8 +105,8 @@ class SimultaneousFit:
         skeletons: the same per trial, with the trial's marker positions.
         posterior: standard deviations and calibration.
         motions: per trial, at the frames of its measured windows.
-        courses: per trial, (f, c) coordinates of the frames of `Kinematics.course_time`, since markers also show the
-            motion between measured windows and around them.
+        trajectories: per trial, (f, c) coordinates of the frames of `Kinematics.trajectory_time`, since markers also
+            show the motion between measured windows and around them.
         deviations: per trial, standard deviations of the curves in these frames; NaN in those that are not reported.
         foot_loads: per trial (w, 2, 6), corrected in position and time, at the motion's bandwidth.
     """
@@ -117,7 +117,7 @@ class SimultaneousFit:
     skeletons: tuple[Skeleton, ...]
     posterior: Posterior
     motions: tuple[Motion, ...]
-    courses: tuple[np.ndarray, ...]
+    trajectories: tuple[np.ndarray, ...]
     deviations: tuple[CurveDeviations, ...]
     foot_loads: tuple[np.ndarray, ...]
 
@@ -164,7 +164,7 @@ def fit_simultaneous(
     offsets_m = [0.0 if staying else moved for moved in result.marker_offsets_m]
     inside = [np.flatnonzero(k.inside(o.time)) for k, o in zip(trials, pooled, strict=False)]
     motions = tuple(m.cut(frames) for m, frames in zip(result.motions, inside, strict=True))
-    spans = [_course(one, k) for one, k in zip(pooled, trials, strict=False)]
+    spans = [_trajectory_frames(one, k) for one, k in zip(pooled, trials, strict=False)]
     informed = any(o.dynamic.any() for o in pooled) or bool(uncertainty.instruments.session)
     known = result.curve_deviations if informed else [sd.of_motion_alone() for sd in result.curve_deviations]
     known = [
@@ -179,7 +179,7 @@ def fit_simultaneous(
         skeletons=tuple(calibrated.with_positions(calibrated.marker_locals + moved) for moved in offsets_m),
         posterior=_posterior(result, prior, seen, trials, motions, uncertainty),
         motions=motions,
-        courses=tuple(m.q[span] for m, span in zip(result.motions, spans, strict=True)),
+        trajectories=tuple(m.q[span] for m, span in zip(result.motions, spans, strict=True)),
         deviations=tuple(sd.spread_over(o.curve_frames - span.start, _size(span)) for sd, o, span in curves),
         foot_loads=tuple(loads[frames] for loads, frames in zip(result.foot_loads, inside, strict=True)),
     )
@@ -200,9 +200,9 @@ def _with_placement(
     return replace(deviations, coordinates=np.sqrt(np.square(deviations.coordinates) + more))
 
 
-def _course(observation: Observation, kinematics: Kinematics) -> slice:
-    """Return the frames of an observation that are those of `Kinematics.course_time`."""
-    time = kinematics.course_time
+def _trajectory_frames(observation: Observation, kinematics: Kinematics) -> slice:
+    """Return the frames of an observation that are those of `Kinematics.trajectory_time`."""
+    time = kinematics.trajectory_time
     first = int(np.argmin(np.abs(observation.time - time[0])))
     return slice(first, first + len(time))
 
@@ -235,7 +235,7 @@ def _posterior(
         base=base_parameters(result.skeleton, result.bsp, prior.sd, complete, load_sd),
         instruments=result.instruments,
         prior_mean=uncertainty.whole(prior.mean),
-        unlikeness=unlikeness(prior, result.bsp, result.bsp_covariance),
+        mahalanobis_distance=mahalanobis_distance(prior, result.bsp, result.bsp_covariance),
         marker_distances_m=_marker_distances(result, trials),
         down_weighted=tuple(map(down_weighted, reduced)),
         draws=result.draws.without_places() if uncertainty.marker_sd_m is None else result.draws,

@@ -354,13 +354,13 @@ def _ground(kinematics: Kinematics, time: np.ndarray, cutoff_hz: float, force_cu
     loads = kinematics.trial.loads
     turn = Rotation.from_euler("y", kinematics.turned_deg, degrees=True).as_matrix()
     reactions = ground_reactions(kinematics, cutoff_hz, force_cutoff)
-    at_frames = loads.carrier[nearest_samples(loads.time, time)]
-    used, places = np.unique(np.concatenate([at_frames, reactions.carrier]), return_inverse=True)
+    at_frames = loads.plate_index[nearest_samples(loads.time, time)]
+    used, places = np.unique(np.concatenate([at_frames, reactions.plate_index]), return_inverse=True)
     places = places.reshape(-1, 2)
     return FootPlates(
         kinematics.smoothed_loads(cutoff_hz),
         smooth(reactions.time, reactions.loaded, cutoff_hz),
-        replace(reactions, carrier=places[len(time) :]),
+        replace(reactions, plate_index=places[len(time) :]),
         tuple(loads.plates[i] for i in used) if loads.plates else (),
         places[: len(time)],
         turn,

@@ -199,7 +199,11 @@ def _write_residuals(trial: TrialFit, folder: Path, forces: str) -> None:
 
 def coordinates_table(fit: Fit, trial: TrialFit) -> TimeTable:
     """Arrange coordinates over time, in degrees and m; all coordinates of the file for an OpenSim model."""
-    time, q = (trial.time, trial.motion.q) if trial.course is None else (trial.kinematics.course_time, trial.course)
+    time, q = (
+        (trial.time, trial.motion.q)
+        if trial.trajectory is None
+        else (trial.kinematics.trajectory_time, trial.trajectory)
+    )
     if fit.file is None:
         names, angles = fit.skeleton.coordinates, fit.skeleton.rotational
     else:

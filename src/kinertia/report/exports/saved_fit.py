@@ -15,7 +15,7 @@ from kinertia.estimation.simultaneous.markers.marker_noise import MarkerNoise
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.uncertainty.evidence import FreeMomentSign, MissingLoad
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import PosteriorDraws, TrialDraws
-from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import OneSided, Unlikeness
+from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import MahalanobisDistance, OneSided
 from kinertia.findings.finding import Finding
 from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.object_archive import read_archive, write_archive
@@ -59,7 +59,7 @@ class SavedFit:
 
 _KINDS = (
     SavedFit, Provenance, Truth, Fit, TrialFit, JointCurves, JointMoments, CurveDeviations, Subject, Settings,
-    Posterior, InstrumentInformation, MarkerNoise, BaseParameters, Combination, Unlikeness, OneSided,
+    Posterior, InstrumentInformation, MarkerNoise, BaseParameters, Combination, MahalanobisDistance, OneSided,
     CalibrationEntry, FreeMomentSign, MissingLoad, PosteriorDraws, TrialDraws,
     Skeleton, Joint, Axis, Marker, Range, PiecewisePolynomial, Composed, BodySegmentParameters,
     OsimModel, OsimJoint, OsimCoordinate, Coupling,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.estimation.prior import literature_prior, updated
-from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import unlikeness
+from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import mahalanobis_distance
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.synthetic.walk import walking_subject
 
@@ -37,7 +37,7 @@ def found(deviations):
     at = [10 * k + column for k in legs for column in range(4)]
     errors = 0.01 * np.diag(np.diag(prior.covariance)[at])
     _, covariance = updated(prior.mean.table().ravel(), prior.covariance, np.eye(120)[at], np.zeros(len(at)), errors)
-    return unlikeness(prior, estimate, covariance)
+    return mahalanobis_distance(prior, estimate, covariance)
 
 
 @pytest.mark.parametrize("foot", [-2.5, -4.5])
@@ -81,5 +81,5 @@ def test_where_no_side_is_heavier_segments_of_the_model_are_named():
 
 def test_sides_that_differ_as_peoples_do_are_nothing():
     rng = np.random.default_rng(0)
-    found = [unlikeness(PRIOR, PRIOR.draw(rng), 1e-6 * PRIOR.covariance).one_sided for _ in range(200)]
+    found = [mahalanobis_distance(PRIOR, PRIOR.draw(rng), 1e-6 * PRIOR.covariance).one_sided for _ in range(200)]
     assert sum(one is not None for one in found) <= 4

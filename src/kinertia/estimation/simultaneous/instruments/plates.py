@@ -83,7 +83,7 @@ def plate_middles(loads: FootLoads, used: np.ndarray) -> np.ndarray:
     firm = np.where(vertical > _FIRM_N, vertical, 0.0)
     result = np.zeros((len(used), 3))
     for k, plate in enumerate(used):
-        weight = np.where(loads.carrier == plate, firm, 0.0)
+        weight = np.where(loads.plate_index == plate, firm, 0.0)
         if weight.any():
             result[k] = np.average(point[weight > 0.0], axis=0, weights=weight[weight > 0.0])
     return result
@@ -105,9 +105,9 @@ class FootPlates:
         loads: time -> (12) force and moment about the ground origin under the right foot, then the left, at the
             motion's bandwidth: for the root equations.
         loaded: time -> (2) whether the right foot, then the left, stands on a plate, at the same bandwidth.
-        reactions: for joint moments, on the time base of the plates; its `carrier` refers to the same `plates`.
+        reactions: for joint moments, on the time base of the plates; its `plate_index` refers to the same `plates`.
         plates: names.
-        carrier: (n, 2) index into `plates` of the plate that each foot stands on, at the frames of the trial.
+        plate_index: (n, 2) index into `plates` of the plate that each foot stands on, at the frames of the trial.
         turn: (3, 3) from the laboratory's axes to the trial's.
         middles: (p, 3) m, points about which the plates are rotated.
     """
@@ -116,7 +116,7 @@ class FootPlates:
     loaded: SmoothedSpline
     reactions: GroundReactions
     plates: tuple[str, ...]
-    carrier: np.ndarray
+    plate_index: np.ndarray
     turn: np.ndarray
     middles: np.ndarray
 
@@ -127,21 +127,25 @@ class FootPlates:
         own = np.array([plates.index(name) for name in self.plates])
         middles = np.zeros((len(plates), 3))
         middles[own] = self.middles
-        reactions = replace(self.reactions, carrier=own[self.reactions.carrier])
-        return replace(self, plates=tuple(plates), carrier=own[self.carrier], reactions=reactions, middles=middles)
+        reactions = replace(self.reactions, plate_index=own[self.reactions.plate_index])
+        return replace(
+            self, plates=tuple(plates), plate_index=own[self.plate_index], reactions=reactions, middles=middles
+        )
 
-    def by_plate(self, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray, plates: np.ndarray) -> np.ndarray:
+    def by_plate(
+        self, loads: np.ndarray, loaded: np.ndarray, plate_index: np.ndarray, plates: np.ndarray
+    ) -> np.ndarray:
         """Compute the derivatives (n, 2, 6, p, 7) of corrected loads (n, 2, 6) by the errors of the plates (p, 7).
 
         `loaded` (n, 2) is 1 where the foot stands.
         """
-        return by_plate(*self._as_compiled(loads, loaded, carrier, plates))
+        return by_plate(*self._as_compiled(loads, loaded, plate_index, plates))
 
     def corrected_loads(
-        self, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray, plates: np.ndarray
+        self, loads: np.ndarray, loaded: np.ndarray, plate_index: np.ndarray, plates: np.ndarray
     ) -> np.ndarray:
         """Correct loads (k, 2, 6) on plates (k, 2) with errors (p, 7), with zero offsets where `loaded` (k, 2)."""
-        return corrected_loads(*self._as_compiled(loads, loaded, carrier, plates))
+        return corrected_loads(*self._as_compiled(loads, loaded, plate_index, plates))
 
     def _as_compiled(self, *arrays: np.ndarray) -> tuple[np.ndarray, ...]:
         """Return the arguments of the compiled functions: these, the middles and the rotation, all contiguous."""
@@ -152,7 +156,7 @@ class FootPlates:
 def corrected_loads(
     loads: Float3,
     loaded: Float2,
-    carrier: Int2,
+    plate_index: Int2,
     plates: Float2,
     middles: Float2,
     turn: Float2,
@@ -162,7 +166,7 @@ def corrected_loads(
     Args:
         loads: (n, 2, 6) as the plates gave them: force (N), moment about the ground origin (N m).
         loaded: (n, 2) 1 where the foot stands, so that zero offsets count.
-        carrier: (n, 2) index of the plate under each foot.
+        plate_index: (n, 2) index of the plate under each foot.
         plates: (p, 7) their errors.
         middles: (p, 3) m, centres of their rotation.
         turn: (3, 3) rotation from the laboratory's axes to the axes of the loads.
@@ -170,7 +174,7 @@ def corrected_loads(
     result, own, push = np.empty(loads.shape), np.empty(6), np.empty(6)
     for i in range(loads.shape[0]):
         for foot in range(loads.shape[1]):
-            plate = carrier[i, foot]
+            plate = plate_index[i, foot]
             for k in range(6):
                 own[k] = loads[i, foot, k]
             for zero, axis in ((ZERO_X, 0), (ZERO_Z, 2)):
@@ -185,7 +189,7 @@ def corrected_loads(
 def by_plate(
     loads: Float3,
     loaded: Float2,
-    carrier: Int2,
+    plate_index: Int2,
     plates: Float2,
     middles: Float2,
     turn: Float2,
@@ -205,7 +209,7 @@ def by_plate(
     place = np.empty(3)
     for i in range(n):
         for foot in range(feet):
-            plate = carrier[i, foot]
+            plate = plate_index[i, foot]
             own, load = result[i, foot, :, plate], loads[i, foot]
             for r in range(3):
                 place[r] = middles[plate, r] + plates[plate, X] * turn[r, 0] + plates[plate, Z] * turn[r, 2]

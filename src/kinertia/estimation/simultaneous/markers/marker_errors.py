@@ -155,7 +155,7 @@ class SeenMarkers(NamedTuple):
         tree: the skeleton.
         column: (a,) index of each axis' coordinate among those that move, then those that do not.
         at, slopes: (n, a) values of the axes, rad or m, and their derivatives by the coordinates.
-        carrier: (m,) the last axis that moves each marker.
+        last_axis: (m,) the last axis that moves each marker.
         local: (n, m, 3) m, the markers in the frames of these axes, displaced with the skin.
         turned: (m, 3, 3) the segments' axes in these frames.
         measured: (n, m, 3) m; NaN where not seen.
@@ -168,7 +168,7 @@ class SeenMarkers(NamedTuple):
     column: Int1
     at: Float2
     slopes: Float2
-    carrier: Int1
+    last_axis: Int1
     local: Float3
     turned: Float3
     measured: Float3
@@ -217,7 +217,7 @@ def seen_markers(
     place = np.empty(q.shape[1], dtype=np.int64)
     place[np.concatenate([moving, still])] = np.arange(q.shape[1])
     at, slopes = skeleton.map.places_and_slopes(q)
-    carrier, local = skeleton.carried_markers
+    last_axis, local = skeleton.carried_markers
     turned = skeleton.tree.segment_rotation[skeleton.marker_segments]
     patterns, coefficients = skin
     along_axes = np.repeat(turned, patterns.last - patterns.first, axis=0) @ coefficients.reshape(-1, 3, 1)
@@ -226,7 +226,7 @@ def seen_markers(
         place[skeleton.map.owner],
         at,
         slopes,
-        carrier,
+        last_axis,
         local + patterns.displaced(along_axes.ravel()),
         np.ascontiguousarray(turned),
         np.ascontiguousarray(measured),
@@ -236,7 +236,7 @@ def seen_markers(
         np.ascontiguousarray(patterns.values),
         patterns.first,
         patterns.last,
-        len(still) + 3 * len(carrier) + patterns.begin[:-1],
+        len(still) + 3 * len(last_axis) + patterns.begin[:-1],
     )
 
 
@@ -247,8 +247,8 @@ def place_markers(markers: SeenMarkers, k: int, placed: PlacedMarkers) -> None:
     rotation, translation = np.empty((a, 3, 3)), np.empty((a, 3))
     place_axes(markers.tree, markers.at[k], rotation, translation, placed.axes[here])
     places, errors, turned = placed.places[here], placed.errors[here], placed.turned[here]
-    for m in range(len(markers.carrier)):
-        j = markers.carrier[m]
+    for m in range(len(markers.last_axis)):
+        j = markers.last_axis[m]
         place_marker(rotation[j], translation[j], markers.local[k, m], places[m])
         for r in range(3):
             errors[m, r] = markers.measured[k, m, r] - places[m, r] if markers.own[k, m] > 0.0 else 0.0
@@ -286,7 +286,7 @@ def add_gradient(
         axes, turned = placed.axes[k % 5], placed.turned[k % 5]
         forces[:] = 0.0
         for i in range(m):
-            add_force(pull[i], placed.places[k % 5, i], forces[markers.carrier[i]])
+            add_force(pull[i], placed.places[k % 5, i], forces[markers.last_axis[i]])
             skin = markers.columns[i] - 3 * markers.first[i]
             for r in range(3):
                 along = turned[i, 0, r] * pull[i, 0] + turned[i, 1, r] * pull[i, 1] + turned[i, 2, r] * pull[i, 2]

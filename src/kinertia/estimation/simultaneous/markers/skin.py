@@ -182,11 +182,11 @@ def girdle_variance(skeleton: Skeleton, q: np.ndarray, shown: np.ndarray) -> np.
 
 def _on_rigid_trunk(skeleton: Skeleton, shoulder: Joint) -> bool:
     """Decide whether the shoulder is fixed in the trunk, with no clavicle or scapula in the model that moves it."""
-    carrier = dict(zip(skeleton.segments, skeleton.tree.carrier.tolist(), strict=True))
+    last_axis = dict(zip(skeleton.segments, skeleton.tree.last_axis.tolist(), strict=True))
     above = {joint.child: joint.parent for joint in skeleton.joints}
     body = shoulder.parent
     while segment_of(above[body]) == "torso":
-        if carrier[body] != carrier[above[body]]:
+        if last_axis[body] != last_axis[above[body]]:
             return segment_of(body) == "torso" and not body.lower().startswith(("clavicle", "scapula"))
         body = above[body]
     return segment_of(body) == "torso"

@@ -127,7 +127,7 @@ class LoadTerm(CostTerm):
         return []
 
     def corrected_loads(
-        self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray
+        self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, plate_index: np.ndarray
     ) -> np.ndarray:
         """Correct loads on the feet (n, 2, 6) for this term's errors, linearly in the loads and in `loaded`.
 
@@ -136,12 +136,12 @@ class LoadTerm(CostTerm):
             static: (S,) unknowns.
             loads: (n, 2, 6) force (N) and moment about the ground origin (N m).
             loaded: (n, 2) 1 where the foot stands, else 0; or its derivative, with derivatives of the loads.
-            carrier: (n, 2) index of the plate under each foot.
+            plate_index: (n, 2) index of the plate under each foot.
         """
         return loads
 
     def by_unknowns(
-        self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray
+        self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, plate_index: np.ndarray
     ) -> np.ndarray:
         """Return the derivatives (n, 2, 6, ...) of the output of `corrected_loads` by the unknowns.
 
@@ -180,20 +180,20 @@ class GroundLoads:
         """Return corrected loads (n, 2, 6) on the feet at the frames of trial k, or their time derivatives."""
         ground, at = self._grounds[k], self._trials[k].time[frames] + self.delay_s(k, static)
         loads = ground.loads(at, derivative).reshape(len(at), 2, 6)
-        return self._corrected(k, static, loads, ground.loaded(at, derivative), ground.carrier[frames])
+        return self._corrected(k, static, loads, ground.loaded(at, derivative), ground.plate_index[frames])
 
     def reactions(self, k: int, static: np.ndarray) -> GroundReactions:
         """Return corrected loads for the joint moments of trial k, on the time base of the markers."""
         raw = self._grounds[k].reactions
-        wrench = self._corrected(k, static, raw.wrench, raw.loaded, raw.carrier)
-        impact = self._corrected(k, static, raw.impact, np.zeros(raw.carrier.shape), raw.carrier)
+        wrench = self._corrected(k, static, raw.wrench, raw.loaded, raw.plate_index)
+        impact = self._corrected(k, static, raw.impact, np.zeros(raw.plate_index.shape), raw.plate_index)
         return replace(raw, time=raw.time - self.delay_s(k, static), wrench=wrench, impact=impact)
 
     def _corrected(
-        self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray
+        self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, plate_index: np.ndarray
     ) -> np.ndarray:
         for term in self._terms:
-            loads = term.corrected_loads(k, static, loads, loaded, carrier)
+            loads = term.corrected_loads(k, static, loads, loaded, plate_index)
         return loads
 
     def by_errors(
@@ -203,12 +203,12 @@ class GroundLoads:
 
         `loaded` (n, 2) is 1 where the foot stands.
         """
-        carrier, nothing = self._grounds[k].carrier[frames], np.zeros(loaded.shape)
+        plate_index, nothing = self._grounds[k].plate_index[frames], np.zeros(loaded.shape)
         for place, term in enumerate(self._terms):
-            by = term.by_unknowns(k, static, loads, loaded, carrier)
+            by = term.by_unknowns(k, static, loads, loaded, plate_index)
             for later in self._terms[place + 1 :]:
                 columns = np.moveaxis(by.reshape(*loads.shape, -1), -1, 0)
-                rhs = [later.corrected_loads(k, static, one, nothing, carrier) for one in columns]
+                rhs = [later.corrected_loads(k, static, one, nothing, plate_index) for one in columns]
                 by = np.stack(rhs, axis=-1).reshape(by.shape)
             yield by, partial(term.add_by_unknowns, k)
 

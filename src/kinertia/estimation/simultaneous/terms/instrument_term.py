@@ -110,16 +110,16 @@ class InstrumentErrors(LoadTerm):
         return places if uncertain and sum(map(bool, self._own)) < 2 else []
 
     def corrected_loads(
-        self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray
+        self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, plate_index: np.ndarray
     ) -> np.ndarray:
         """Correct loads for all errors but delays."""
-        return self.given.grounds[k].corrected_loads(loads, loaded, carrier, self.plates_in(k, static))
+        return self.given.grounds[k].corrected_loads(loads, loaded, plate_index, self.plates_in(k, static))
 
     def by_unknowns(
-        self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray
+        self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, plate_index: np.ndarray
     ) -> np.ndarray:
         """Return derivatives (n, 2, 6, p, 7) by the errors of the plates in trial k."""
-        return self.given.grounds[k].by_plate(loads, loaded, carrier, self.plates_in(k, static))
+        return self.given.grounds[k].by_plate(loads, loaded, plate_index, self.plates_in(k, static))
 
     def add_by_unknowns(self, k: int, by_static: np.ndarray, by: np.ndarray) -> None:
         """Add derivatives (n, r, p, 7) by the errors of the plates in trial k."""
@@ -223,7 +223,7 @@ def mean_loads_n(trial: Observation) -> np.ndarray:
     stood = trial.ground.loaded(trial.time[frames]).reshape(-1, 2)
     result = np.zeros(len(trial.ground.plates))
     for plate in range(len(result)):
-        share = np.where(trial.ground.carrier[frames] == plate, np.clip(stood, 0.0, 1.0), 0.0)
+        share = np.where(trial.ground.plate_index[frames] == plate, np.clip(stood, 0.0, 1.0), 0.0)
         result[plate] = (share * vertical).sum() / max(share.sum(), 1.0)
     return result
 
@@ -256,7 +256,7 @@ def _parts(given: Given) -> Iterator[LoadPart]:
         vertical = ground.loads(trial.time).reshape(-1, 2, 6)[..., 1]
         for foot, load in enumerate(vertical.T):
             for plate in incomplete:
-                on = (load > _LOADED * load.max()) & (ground.carrier[:, foot] == plate)
+                on = (load > _LOADED * load.max()) & (ground.plate_index[:, foot] == plate)
                 for first, last in runs(on):
                     yield from _of_contact(k, foot, plate, trial.dynamic, np.arange(first, last + 1))
 

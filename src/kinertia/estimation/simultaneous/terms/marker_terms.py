@@ -148,7 +148,7 @@ def _frame(
 
     W r covers five frames.
     """
-    a, m, here = len(markers.column), len(markers.carrier), k % 5
+    a, m, here = len(markers.column), len(markers.last_axis), k % 5
     most = 1
     for i in range(m):
         most = max(most, 1 + markers.last[i] - markers.first[i])
@@ -158,8 +158,8 @@ def _frame(
     sums, forces, met = np.zeros((a, 16)), np.zeros((a, 6)), np.empty((a, 6))
     for i in range(m):
         at = placed.places[here, i]
-        add_marker(markers.own[k, i], at, at, sums[markers.carrier[i]])
-        add_force(pull[i], at, forces[markers.carrier[i]])
+        add_marker(markers.own[k, i], at, at, sums[markers.last_axis[i]])
+        add_force(pull[i], at, forces[markers.last_axis[i]])
         for r in range(3):
             static.cost[0] += placed.errors[here, i, r] * pull[i, r]
     if bordered:
@@ -232,7 +232,7 @@ def _by_place(
     across, square, rhs = interval.across[row], static.square, static.rhs
     most = directions.shape[2]
     own, values, velocity = np.empty((3, most)), np.empty(most), np.empty(3)
-    for m in range(len(markers.carrier)):
+    for m in range(len(markers.last_axis)):
         d, place, first = directions[m], still + 3 * m, markers.first[m]
         # number of columns before those of the skin
         skin = markers.columns[m] - 3
@@ -249,7 +249,7 @@ def _by_place(
                     square[one, place + j] += pattern * own[i, j]
                 for j in range(3, count):
                     square[one, skin + j] += pattern * own[i, j]
-        j = markers.carrier[m]
+        j = markers.last_axis[m]
         while j >= 0:
             velocity[0] = axes[j, 0] + axes[j, 4] * at[m, 2] - axes[j, 5] * at[m, 1]
             velocity[1] = axes[j, 1] + axes[j, 5] * at[m, 0] - axes[j, 3] * at[m, 2]
@@ -284,8 +284,8 @@ def _pair(
     a, here, there = len(markers.column), k % 5, (k + later) % 5
     sums, met = np.zeros((a, 16)), np.empty((a, 6))
     weights = markers.next[k] if later == 1 else markers.second[k]
-    for m in range(len(markers.carrier)):
-        add_marker(weights[m], placed.places[here, m], placed.places[there, m], sums[markers.carrier[m]])
+    for m in range(len(markers.last_axis)):
+        add_marker(weights[m], placed.places[here, m], placed.places[there, m], sums[markers.last_axis[m]])
     hand_down(markers.tree.parent, sums)
     back = swapped(sums)
     parent, column, slopes = markers.tree.parent, markers.column, markers.slopes
@@ -369,10 +369,10 @@ def _reach(markers: SeenMarkers, c: int, still: int) -> np.ndarray:
     """
     reach = np.zeros((c, 3, 2), dtype=np.int64)
     reach[:, 0, 1] = still
-    for m in range(len(markers.carrier)):
+    for m in range(len(markers.last_axis)):
         place, skin = still + 3 * m, markers.columns[m]
         wide = 3 * (markers.last[m] - markers.first[m])
-        j = markers.carrier[m]
+        j = markers.last_axis[m]
         while j >= 0:
             if markers.column[j] < c:
                 _widen(reach[markers.column[j], 1], place, place + 3)

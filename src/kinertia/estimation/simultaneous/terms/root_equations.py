@@ -90,7 +90,7 @@ def root_columns(
     n, count = x.shape
     left, by = np.zeros((n, 6)), np.zeros((3, n, 6, columns.wide))
     frame, column = empty_frame(count, gravity_m_s2), np.empty((3, 6))
-    rotation, translation = np.empty((len(tree.carrier), 3, 3)), np.empty((len(tree.carrier), 3))
+    rotation, translation = np.empty((len(tree.last_axis), 3, 3)), np.empty((len(tree.last_axis), 3))
     load = np.empty(6)
     for i in range(n):
         fill(tree, bodies, x[i], v[i], a[i], frame)
@@ -179,10 +179,10 @@ def _columns_by_bodies(
     w, e, b, own, by = np.empty(3), np.empty(3), np.empty(3), np.empty((6, 10)), np.empty((6, 10))
     for body in range(len(segments)):
         s = segments[body]
-        carrier, turn = tree.carrier[s], rotation[s]
-        if carrier < 0:
+        last_axis, turn = tree.last_axis[s], rotation[s]
+        if last_axis < 0:
             continue
-        in_segment(frame.velocity[carrier], frame.acceleration[carrier], turn, translation[s], w, e, b)
+        in_segment(frame.velocity[last_axis], frame.acceleration[last_axis], turn, translation[s], w, e, b)
         own_regressor(w, e, b, own)
         by[:] = 0.0
         for r in range(6):
@@ -234,7 +234,7 @@ def add_root_gradient(
     cost, by_bodies, by_ground = 0.0, np.zeros((len(columns.segments), 10)), np.empty((n, 6))
     frame, left, load = empty_frame(count, gravity_m_s2), np.empty(6), np.zeros((1, 6))
     pull, by = np.empty(6), np.empty((count, 3))
-    rotation, translation = np.empty((len(tree.carrier), 3, 3)), np.empty((len(tree.carrier), 3))
+    rotation, translation = np.empty((len(tree.last_axis), 3, 3)), np.empty((len(tree.last_axis), 3))
     for k in range(n):
         fill(tree, bodies, x[k], v[k], a[k], frame)
         place_segments(tree, frame.rotation, frame.translation, rotation, translation)
@@ -344,10 +344,10 @@ def _gradient_by_bodies(
     w, e, b = np.empty(3), np.empty(3), np.empty(3)
     for body in range(len(segments)):
         s = segments[body]
-        carrier, turn = tree.carrier[s], rotation[s]
-        if carrier < 0:
+        last_axis, turn = tree.last_axis[s], rotation[s]
+        if last_axis < 0:
             continue
-        in_segment(frame.velocity[carrier], frame.acceleration[carrier], turn, translation[s], w, e, b)
+        in_segment(frame.velocity[last_axis], frame.acceleration[last_axis], turn, translation[s], w, e, b)
         # at the segment's origin, in its axes
         x, y, z = translation[s, 0], translation[s, 1], translation[s, 2]
         fx = pull[0] + pull[4] * z - pull[5] * y

@@ -99,7 +99,7 @@ def one_sided(prior: BspPrior, estimate: BodySegmentParameters, covariance: np.n
 
 
 @dataclass(frozen=True)
-class Unlikeness:
+class MahalanobisDistance:
     """Distance of an estimate from its prior.
 
     Attributes:
@@ -126,7 +126,9 @@ class Unlikeness:
         return self.chance < UNLIKE_CHANCE
 
 
-def unlikeness(prior: BspPrior, estimate: BodySegmentParameters, covariance: np.ndarray) -> Unlikeness:
+def mahalanobis_distance(
+    prior: BspPrior, estimate: BodySegmentParameters, covariance: np.ndarray
+) -> MahalanobisDistance:
     """Compute the distance of the estimate (with its table's posterior covariance) from the prior given the scale."""
     mean, before = replace(prior, mass_sd_kg=_SCALE_AGAINST_PLATES * prior.mass_kg).given_scale()
     sd = np.sqrt(np.diag(before))
@@ -141,7 +143,7 @@ def unlikeness(prior: BspPrior, estimate: BodySegmentParameters, covariance: np.
     segments = tuple(estimate.segments[k] for k in order)
     side = one_sided(prior, estimate, covariance)
     alike = side is None and _alike(estimate.segments, by_segment, int(order[0]))
-    return Unlikeness(distance2, count, chance, segments, alike, side)
+    return MahalanobisDistance(distance2, count, chance, segments, alike, side)
 
 
 def _alike(segments: Sequence[str], moved: np.ndarray, k: int) -> bool:
