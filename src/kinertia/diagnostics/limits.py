@@ -25,24 +25,35 @@ from kinertia.findings.rule import Rule
 from kinertia.io.c3d.reader import PERSON_M
 from kinertia.io.lab_plates import MOMENTS_FIT
 from kinertia.io.opensim.reader import EARTHS_GRAVITY_M_S2
-from kinertia.io.recording import FARTHEST_M
+from kinertia.io.recording import FARTHEST_M, STRONGEST_N
 from kinertia.io.subject.body_files import LONGEST_CM, SHORTEST_CM
 from kinertia.io.subject.person_recordings import FASTEST_M_S
 from kinertia.io.text.number_table import LARGEST_STEP_S
+from kinertia.io.text.trc import RATE_ERROR
+from kinertia.model.anthropometry import BODY_MASS_KG, STATURE_M
+from kinertia.model.stadium_body import GIRTH_OVER_WIDTH
 
 ALL_CHECKS: tuple[Check[Any], ...] = (*STATIC_CHECKS, *MOTION_CHECKS, *PERSON_CHECKS, *ESTIMATE_CHECKS, *RESULT_CHECKS)
 REPORTED_ELSEWHERE: Mapping[str, Mapping[str, Limit]] = {
     "F122": {"smallest": Limit(PERSON_M[0], "m"), "largest": Limit(PERSON_M[1], "m")},
     "F153": {"misses": Limit(MOMENTS_FIT)},
-    "F171": {"farthest": Limit(FARTHEST_M, "m")},
+    "F171": {"farthest": FARTHEST_M},
+    "F172": {"strongest": STRONGEST_N},
     "F181": {"fastest": Limit(FASTEST_M_S, "m/s")},
     "F182": {"shortest": Limit(SHORTEST_CM / 100.0, "m"), "longest": Limit(LONGEST_CM / 100.0, "m")},
     "M173": {"moved": CALIBRATED_M},
     "O411": {"share": MODEL_MASS_SHARE},
     "O413": {"light": Limit(LIGHT_KG, "kg")},
     "S402": {"distance": KNOWN_BODY_SD},
-    "S403": {"distance": Limit(FAR_SD)},
+    "S102": {
+        "lightest": BODY_MASS_KG[0],
+        "heaviest": BODY_MASS_KG[1],
+        "shortest": STATURE_M[0],
+        "tallest": STATURE_M[1],
+    },
+    "S403": {"distance": Limit(FAR_SD), "least": GIRTH_OVER_WIDTH[0], "most": GIRTH_OVER_WIDTH[1]},
     "S404": {"distance": KNOWN_BODY_SD},
+    "T103": {"differs": RATE_ERROR},
     "T106": {"step": Limit(LARGEST_STEP_S, "s")},
     "O104": {"least": Limit(EARTHS_GRAVITY_M_S2[0], "m/s2"), "most": Limit(EARTHS_GRAVITY_M_S2[1], "m/s2")},
     "O311": {"clamped": CLAMPED},

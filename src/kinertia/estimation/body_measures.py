@@ -164,7 +164,7 @@ def _implausible(
         if one in stated and other in stated:
             ratio = stated[one][0] / stated[other][0]
             low, high = GIRTH_OVER_WIDTH
-            if not 0.95 * low < ratio < 1.05 * high:
+            if not low < ratio < high:
                 measure = f"{one}, as a multiple of {other},"
                 found.append(_unlike(measure, Quantity(ratio, "1"), Quantity("2 to 3.14"), ratio=Quantity(ratio, "1")))
     return tuple(found)

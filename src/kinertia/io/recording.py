@@ -8,7 +8,7 @@ import numpy as np
 from kinertia.errors import FileError, KinertiaError, TrialError
 from kinertia.findings.extensions import READERS, loaded, names
 from kinertia.findings.finding import Finding, finding
-from kinertia.findings.quantity import Quantity, Where
+from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.io.ground_forces import read_forces
 from kinertia.io.lab_plates import upright_along_z
 from kinertia.io.text.number_table import expect_file, wrong_kind
@@ -23,7 +23,7 @@ CORTEX = ".forces"
 _SUBJECT = ".b3d"
 FORCE_FILES = (".mot", ".sto", ".tsv", CORTEX)
 """Endings of what is read; those of installed packages that extend Kinertia are read by their functions."""
-FARTHEST_M, _STRONGEST_N = 1000.0, 1e6
+FARTHEST_M, STRONGEST_N = Limit(1000.0, "m"), Limit(1e6, "N")
 """Farther and stronger than anything in a laboratory."""
 
 
@@ -171,10 +171,10 @@ def _expect_laboratory(path: Path, recording: Recording) -> None:
     if plates is None:
         return
     loads = np.concatenate((plates.force, plates.moment / FARTHEST_M), axis=2)
-    strong = np.argwhere(~(np.abs(loads) < _STRONGEST_N))
+    strong = np.argwhere(~(np.abs(loads) < STRONGEST_N))
     if strong.size:
         frame, plate, axis = strong[0]
-        what, unit, limit = ("force", "N", _STRONGEST_N) if axis < 3 else ("moment", "N m", _STRONGEST_N * FARTHEST_M)
+        what, unit, limit = ("force", "N", STRONGEST_N) if axis < 3 else ("moment", "N m", STRONGEST_N * FARTHEST_M)
         name, value = "force_n" if axis < 3 else "moment_nm", float(plates.wrench[frame, plate, axis])
         size = {name: Quantity(value, unit, limit=limit)} if np.isfinite(value) else {}
         load = impossible_load(plates.names[plate], what, float(plates.time[frame]), **size)

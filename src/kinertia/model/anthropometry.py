@@ -20,7 +20,7 @@ import numpy as np
 
 from kinertia.errors import SubjectError, problem_of
 from kinertia.findings.finding import finding
-from kinertia.findings.quantity import Quantity, Where
+from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.model.bsp import MIRROR_SIGNS, BodySegmentParameters, FloatArray, combine
 
 SEGMENTS = (
@@ -81,6 +81,9 @@ class _Part:
     length_m: float
 
 
+BODY_MASS_KG = Limit(10.0, "kg"), Limit(300.0, "kg")
+STATURE_M = Limit(0.5, "m"), Limit(2.5, "m")
+"""Least and largest that are believed."""
 _UNITS_OF_HEIGHT = {"millimetres": 300.0, "centimetres": 100.0, "inches": 20.0, "feet": 3.0}
 """Least height in each unit."""
 _OTHER_UNIT = "another unit"
@@ -92,10 +95,10 @@ def check_subject(mass_kg: float, height_m: float, sex: str) -> None:
     Raises:
         SubjectError: mass outside 10-300 kg, height outside 0.5-2.5 m, or another sex.
     """
-    if not 10.0 <= mass_kg <= 300.0:
+    if not BODY_MASS_KG[0] <= mass_kg <= BODY_MASS_KG[1]:
         unit = "grams" if 1000.0 < mass_kg < np.inf else _OTHER_UNIT
         raise _implausible("mass_kg", "mass", mass_kg, Quantity(mass_kg, "kg"), unit)
-    if not 0.5 <= height_m <= 2.5:
+    if not STATURE_M[0] <= height_m <= STATURE_M[1]:
         unit = next((name for name, least in _UNITS_OF_HEIGHT.items() if height_m > least), _OTHER_UNIT)
         raise _implausible("height_m", "stature", height_m, Quantity(height_m, "m"), unit)
     if sex not in _DUMAS_STATURE_M:

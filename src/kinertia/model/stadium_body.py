@@ -35,7 +35,7 @@ import numpy as np
 
 from kinertia.errors import PriorError, how_to_install
 from kinertia.findings.finding import Severity, with_evidence
-from kinertia.findings.quantity import Quantity, Where
+from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.model.bsp import BodySegmentParameters, FloatArray, combine
 
 KINDS = ("pelvis", "torso", "thigh_r", "shank_r", "foot_r", "upper_arm_r", "forearm_r")
@@ -60,8 +60,8 @@ _FOREARM = ("forearm", "forearm", "hand", "hand", "hand")
 _UPRIGHT = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])
 _POINTED = np.array([[0.0, 0.0, -1.0], [0.0, -1.0, 0.0], [-1.0, 0.0, 0.0]])
 """The package's axes in those of a segment, and of the foot."""
-GIRTH_OVER_WIDTH = (2.0, np.pi)
-"""Least and greatest ratio in any stadium; depths count as widths."""
+GIRTH_OVER_WIDTH = Limit(0.95 * 2.0), Limit(1.05 * np.pi)
+"""Least and greatest ratio: 5 % beyond those of any stadium, 2 and pi; depths count as widths."""
 
 
 def expect_yeadon() -> None:

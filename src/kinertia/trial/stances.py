@@ -7,18 +7,21 @@ from typing import Any, Self
 
 import numpy as np
 
+from kinertia.findings.quantity import Limit
 from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, BoolArray, FootLoads, Trial
 from kinertia.trial.file_contents import SAME_EVENT_S, FileEvent, GaitEvent, nearest_event
 from kinertia.trial.ground_contact import BRIDGED_GAP_S, CONTACT_SLACK_S, bridged
 from kinertia.trial.plate_assignment import FOOT_NAMES, SHORTEST_CONTACT_S
 from kinertia.trial.sampled_data import TIME_TOLERANCE_S, nearest_samples, runs, span_s, within
 
-STANCE_PHASES = {"loading response": (0, 15), "mid-stance": (15, 65), "push-off": (65, 100)}
+LOADING_END, MID_STANCE_END = Limit(0.15), Limit(0.65)
+_LOADED, _PASSED = round(100 * LOADING_END), round(100 * MID_STANCE_END)
+STANCE_PHASES = {"loading response": (0, _LOADED), "mid-stance": (_LOADED, _PASSED), "push-off": (_PASSED, 100)}
 """Parts of stance, in percent of the time from foot contact to foot off."""
 _PERCENT = np.arange(101)
 _SAMPLING = 3
 """Percent of a stance that a frame or two take: gaps as short are none."""
-_OF_PHASE, _OF_STANCE = 0.9, 0.1
+OF_PHASE, _OF_STANCE = Limit(0.9), 0.1
 """A phase is known if so much of it is; a stance has moments at all if so much of it has."""
 _STANCE_S, _STRIDE_S = (0.1, 3.0), (0.4, 3.0)
 _SAME_CONTACT_S = 2 * CONTACT_SLACK_S
@@ -122,7 +125,7 @@ class LegCoverage:
     def missing(self) -> tuple[str, ...]:
         """Names of the phases of stance that are not known."""
         return tuple(
-            name for name, (start, end) in STANCE_PHASES.items() if self.stance[start : end + 1].mean() < _OF_PHASE
+            name for name, (start, end) in STANCE_PHASES.items() if self.stance[start : end + 1].mean() < OF_PHASE
         )
 
     @property

@@ -25,7 +25,15 @@ from kinertia.trial.data import FEET, BoolArray, FloatArray, Recording
 from kinertia.trial.ground_contact import FootMarkers, bridged
 from kinertia.trial.plate_assignment import FOOT_NAMES, SHORTEST_CONTACT_S, assign_plates, no_forces
 from kinertia.trial.sampled_data import runs, within
-from kinertia.trial.stances import LegCoverage, joined_coverage, leg_coverage, listed
+from kinertia.trial.stances import (
+    LOADING_END,
+    MID_STANCE_END,
+    OF_PHASE,
+    LegCoverage,
+    joined_coverage,
+    leg_coverage,
+    listed,
+)
 from kinertia.trial.trial_input import GAIT, Task
 
 _FOOT_NAMES = {"r": "right", "l": "left", None: "unknown foot"}
@@ -164,7 +172,7 @@ def coverage_of(context: RecordingContext) -> tuple[LegCoverage, ...]:
     return leg_coverage(trial, trial.known_legs)
 
 
-@check("P272", "P289")
+@check("P272", "P289", phase=OF_PHASE, loading=LOADING_END, middle=MID_STANCE_END)
 def stance_coverage(context: PersonContext) -> Iterator[Finding]:
     """Report P272: a phase of a leg's stance is on plates in no trial of a task; P289: hardly anything of it is.
 

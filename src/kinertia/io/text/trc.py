@@ -10,7 +10,7 @@ import numpy as np
 
 from kinertia.errors import FileError
 from kinertia.findings.finding import Finding, finding
-from kinertia.findings.quantity import Quantity, Where
+from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.text.number_table import (
     malformed,
@@ -26,6 +26,8 @@ from kinertia.io.text.number_table import (
 from kinertia.io.text.sto import header_entry, other_count
 from kinertia.trial.data import BoolArray, FloatArray, Markers, Recording
 
+RATE_ERROR = Limit(0.01)
+"""By which the header's rate may differ from that of the time column."""
 METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 _HEADER_KEYS = ("DataRate", "NumFrames", "NumMarkers", "Units")
@@ -230,7 +232,7 @@ def _uniform_time(
     step = (time[-1] - time[0]) / (len(time) - 1)
     at_rate = time[0] + np.arange(len(time)) / rate_hz if rate_hz > 0 else np.full(len(time), np.inf)
     # three frames at 60 Hz, told to the millisecond, run at 60.6 Hz by their ends
-    if abs(rate_hz * step - 1) > 0.01 and np.abs(time - at_rate).max() > rounding_s(time):
+    if abs(rate_hz * step - 1) > RATE_ERROR and np.abs(time - at_rate).max() > rounding_s(time):
         rates = {"header_hz": Quantity(rate_hz, "Hz"), "column_hz": Quantity(float(1 / step), "Hz")}
         raise FileError.found(path, "T103", 3, **rates)
     frames = np.arange(len(time))

@@ -8,5 +8,5 @@ minimises
 shortened to where terms hold (`CostTerm.shorten`). Steps d_k and changes of slope y_k = g(k+1) - g(k) then correct H
 along them, as L-BFGS does (`gauss_newton`). Priors of errors that are no Gaussians are replaced by the Gaussian that
 gives the posterior the same mean and covariance, again and again (`mixture_prior`). A delay's posterior is taken from
-the profile min F over all else, at three delays (`delay_profile`).
+the profile min F over all else, at three delays (`marginal_posterior`).
 """

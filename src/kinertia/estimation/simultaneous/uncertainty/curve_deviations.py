@@ -108,7 +108,7 @@ def curve_deviations(
         coefficients, static: the estimate.
         eliminated: the trial's normal equations there, undamped.
         root: (S, S + u) root of the posterior covariance of the static unknowns: u columns of their own
-            (`delay_profile`), then those of `StaticInformation`, of which the rows of unknowns in the root
+            (`marginal_posterior`), then those of `StaticInformation`, of which the rows of unknowns in the root
             equations, which come first, have only as many nonzero columns as there are such unknowns.
         noise: (3,) `motion_noise`, of errors that do not recur.
     """
