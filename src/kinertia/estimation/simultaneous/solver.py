@@ -2,13 +2,13 @@
 
 Unknowns are the quintic spline coefficients of every coordinate (uniform knots; their spacing follows the cutoff), and
 unknowns of the cost terms that do not move in time (`terms`), some of them displaced in each of several trials
-(`model_terms`). The sum of the terms is minimised: squares of marker errors, root residuals and distances from
-the priors, each over its standard deviation. Priors of errors of the ground reactions are Gaussians that are adapted to
-the data (`mixture_prior`). Steps are Gauss-Newton, corrected by the gradients along the way (`gauss_newton`), with all
+(`model_terms`). The sum of the terms is minimised: squares of marker errors, root residuals and distances from the
+priors, each over its standard deviation. Priors of errors of the ground reactions are Gaussians that are adapted to the
+data (`mixture_prior`). Steps are Gauss-Newton, corrected by the gradients along the way (`gauss_newton`), with all
 derivatives analytic. The normal matrix is block tridiagonal in time with a border of static unknowns
 (`block_tridiagonal`); its Schur complement is the information on them, and its inverse their covariance. The estimate
-is averaged over knot positions (`marginal_posterior`). At the end some errors get their posterior from the profile of the
-cost, and the variance of unknowns that only displace others is added (`marginal_posterior`).
+is averaged over knot positions (`marginal_posterior`). At the end some errors get their posterior from the profile of
+the cost, and the variance of unknowns that only displace others is added (`marginal_posterior`).
 
 Frames in which forces change faster than the motion can follow have less weight for all unknowns that do not move
 (`impacts`). When these are found, the motion alone is made to follow the forces there, too.

@@ -4,8 +4,8 @@ A draw of the static unknowns is a root of their covariance times independent no
 through the border of the normal equations, and differs from it by what the markers leave undetermined:
 `Eliminated.motion_step` does both at once. The motion's own part is then reduced according to the observed marker
 errors, as `curve_deviations` reduces its derivatives (`motion_noise`): by a filter, since positions, rates and
-accelerations each have a share of their own and a draw is one motion. Knot positions (`marginal_posterior`), thigh masses in
-other tasks (`model_terms`) and impact transients each add an independent number.
+accelerations each have a share of their own and a draw is one motion. Knot positions (`marginal_posterior`), thigh
+masses in other tasks (`model_terms`) and impact transients each add an independent number.
 
 Draws are made once, with a fixed seed, and stored with the result: a few hundred take less memory than the factors from
 which more could be made.
