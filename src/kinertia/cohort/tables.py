@@ -29,8 +29,8 @@ from kinertia.findings.finding import Severity
 from kinertia.findings.overview import Overview, finding_columns
 from kinertia.io.norms_file import Norm
 from kinertia.io.text.csv_file import inert, read_csv
-from kinertia.report.comparison.change_tables import group_columns
 from kinertia.io.working_folder import working_folder
+from kinertia.report.comparison.change_tables import group_columns
 from kinertia.report.exports.files import summary
 from kinertia.report.exports.saved_fit import load_fit
 from kinertia.report.figures.cycle_figures import MOST_STRIDES, titled_quantities
