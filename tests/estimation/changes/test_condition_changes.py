@@ -27,7 +27,7 @@ from kinertia.report.exports.saved_fit import write_fit
 DRAWS = 1000
 
 
-def judged(change, strides, shared_sd, own_sd, stride_sd, seed=0):
+def judged(change, strides, shared_sd, own_sd, stride_sd, seed=0, contacts=(0.0, 0.0)):
     """Changes of one outcome: so many strides of two conditions, with errors that all share and that each has."""
     rng = np.random.default_rng(seed)
     count = sum(strides)
@@ -38,7 +38,8 @@ def judged(change, strides, shared_sd, own_sd, stride_sd, seed=0):
     estimate = truth + errors
     departures = shared_sd * rng.standard_normal((DRAWS, 1)) + own_sd * rng.standard_normal((DRAWS, count))
     still = np.broadcast_to(estimate, departures.shape)
-    drawn = {"all": estimate + departures, "body": still, "instruments": still}
+    by_contacts = np.where(second, contacts[1], contacts[0])[None]
+    drawn = {"all": estimate + departures, "body": still, "instruments": still, "contacts": by_contacts}
     (found,) = changes_of_strides(Rows(tuple(keys), estimate, drawn), [~second, second])
     return found
 
@@ -49,6 +50,12 @@ def test_errors_that_all_strides_share_cancel():
     assert found.sd < 0.02
     assert (found.joint, found.component, found.side, found.event) == ("knee", "adduction", "r", "late stance")
     np.testing.assert_allclose(np.hypot.reduce(list(found.sd_by_source.values())), found.sd, rtol=1e-6)
+
+
+@pytest.mark.parametrize(("contacts", "expected"), [((0.03, 0.03), 0.0), ((0.03, -0.01), 0.04)])
+def test_an_error_of_contacts_cancels_where_it_does_as_much_in_both_conditions(contacts, expected):
+    found = judged(0.0, (4, 4), shared_sd=0.5, own_sd=0.001, stride_sd=0.0, contacts=contacts)
+    assert found.sd_by_source["markers"] == pytest.approx(expected, abs=0.001)
 
 
 @pytest.mark.parametrize("own_sd", [0.005, 0.05])

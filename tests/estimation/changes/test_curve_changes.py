@@ -18,7 +18,7 @@ def wavy(rng, sd, count):
     return sd / np.sqrt(3.0) * rng.standard_normal((count, len(SHAPES))) @ SHAPES
 
 
-def compared(seed, strides=4, change=1.0, measured_sd=0.01, stride_sd=0.02):
+def compared(seed, strides=4, change=1.0, measured_sd=0.01, stride_sd=0.02, contacts_sd=0.0):
     """One curve of both sides in two conditions, each stride with errors of its own and of all."""
     rng = np.random.default_rng(seed)
     rows = []
@@ -32,8 +32,15 @@ def compared(seed, strides=4, change=1.0, measured_sd=0.01, stride_sd=0.02):
                 keys.append((f"{second} {k}", "moment knee_adduction", side, "stride 1"))
                 estimate.append(own)
                 drawn.append(own + drawn_common + wavy(rng, measured_sd, 60))
-        rows.append(Rows(tuple(keys), np.array(estimate), {"all": np.swapaxes(drawn, 0, 1)}))
+        values = np.array(estimate)
+        contacts = np.full((1, *values.shape), contacts_sd * second)
+        rows.append(Rows(tuple(keys), values, {"all": np.swapaxes(drawn, 0, 1), "contacts": contacts}))
     return list(curve_changes(*rows, paired))
+
+
+def test_an_error_of_contacts_widens_the_band():
+    (one, _), (other, _) = compared(0), compared(0, contacts_sd=0.05)
+    np.testing.assert_allclose(np.square(other.sd) - np.square(one.sd), 0.05**2)
 
 
 @pytest.mark.parametrize(("measured_sd", "stride_sd"), [(0.02, 0.005), (0.005, 0.02)])
@@ -83,7 +90,9 @@ def test_strides_or_stances_are_chosen_by_their_number():
             *(("walk", "angle knee_angle", "r", f"stance {k}") for k in (2, 3)),
         ]
         values = np.arange(3.0)[:, None] * np.ones(101)
-        rows.append(Rows(tuple(keys), values, {"all": np.array([values, values + 1.0])}))
+        rows.append(
+            Rows(tuple(keys), values, {"all": np.array([values, values + 1.0]), "contacts": 0.0 * values[None]})
+        )
     (found,) = curve_changes(*rows, paired)
     assert isinstance(found, CurveChange)
     assert (found.phase, found.strides) == ("stance", (2, 2))

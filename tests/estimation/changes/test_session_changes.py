@@ -12,10 +12,14 @@ from command_line import run
 from kinertia.errors import KinertiaError
 from kinertia.estimation.changes import session_changes as module
 from kinertia.estimation.changes.session_changes import session, why_incomparable
+from kinertia.estimation.changes.stride_features import _CONTACTS, CONTACT_SD_S, _Strides
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.report.comparison.what_changed import compare
 from kinertia.report.exports.saved_fit import write_fit
+from kinertia.trial.stances import load_edges
 from report_page import Elements
+
+TIMES = ("start_s", "end_s", "toe_off_s", "opposite_toe_off_s", "opposite_strike_s")
 
 
 def trial_under(trial, condition, shift_m=0.0):
@@ -75,6 +79,27 @@ def test_the_deviation_is_that_of_two_independent_sessions(fit, found):
     sd = np.degrees(trial.joint_curves.deviations.coordinates[:, column].mean())
     factor = module._FIXED_AXES if session(fit).fixed_axes else 1.0
     assert one.sd_by_source["markers"] == pytest.approx(factor * np.sqrt(2.0) * sd, rel=0.4)
+
+
+def test_contacts_that_no_plate_measured_are_uncertain(fit):
+    """By as much as a later contact changes each average; those of plates are not."""
+    (trial,) = fit.trials
+    own = _Strides.of([trial])
+    edges = load_edges(trial.kinematics.trial.loads)
+    for side, kind in _CONTACTS:
+        measured = [one.time_s for one in edges if one[1:] == (side, kind)]
+        for one, other in zip(own.strides[0], own.later([trial], side, kind).strides[0], strict=True):
+            times = {name: getattr(other, name) - getattr(one, name) for name in TIMES}
+            moved = {name for name, later in times.items() if later != 0.0 and np.isfinite(later)}
+            assert {round(times[name], 9) for name in moved} <= {CONTACT_SD_S}
+            assert not [t for name in moved for t in measured if abs(getattr(one, name) - t) < 0.002]
+            strike = one.opposite_strike_s if one.side != side else one.start_s
+            if (
+                kind == "heel strike"
+                and np.isfinite(strike)
+                and min(abs(np.array(measured) - strike), default=1) > 0.02
+            ):
+                assert moved & {"start_s", "opposite_strike_s"}
 
 
 def test_a_changed_knee_is_found(sessions):

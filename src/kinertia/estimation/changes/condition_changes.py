@@ -100,7 +100,7 @@ class Condition:
 
     Attributes:
         mean, count: over the strides.
-        drawn: by source (n,) the mean in each draw.
+        drawn: by source (n,) the mean in each draw; of "contacts" its departures.
         spread: variance from stride to stride beyond what is measured; zero with fewer than two.
     """
 
@@ -147,7 +147,8 @@ def _paired(_: str, before: Condition, after: Condition) -> dict[str, float]:
     total, body, instruments = (
         float(np.var(after.drawn[source] - before.drawn[source], ddof=1)) for source in ("all", "body", "instruments")
     )
-    return parts_of(total, instruments, body)
+    contacts = float(np.square(after.drawn["contacts"] - before.drawn["contacts"]).sum())
+    return parts_of(total + contacts, instruments, body)
 
 
 def parts_of(total: float, instruments: float, body: float) -> dict[str, float]:

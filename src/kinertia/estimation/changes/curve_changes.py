@@ -80,7 +80,7 @@ class CurveCondition:
     Attributes:
         mean: (101,) over the strides.
         count: of strides.
-        departures: by source (n, 101) of the mean in each draw.
+        departures: by source (n, 101) of the mean in each draw, and by contacts.
         residuals: (count, 101) of the strides from their mean.
         spread: (101,) variance from stride to stride beyond what is measured.
     """
@@ -99,7 +99,8 @@ Measured = Callable[[CurveCondition, CurveCondition], tuple[np.ndarray, Sequence
 def paired(before: CurveCondition, after: CurveCondition) -> tuple[np.ndarray, Sequence[np.ndarray]]:
     """Return the error of a difference in one estimate, in which errors of both conditions belong together."""
     together = after.departures["all"] - before.departures["all"]
-    return together.var(axis=0, ddof=1), (together,)
+    contacts = np.square(after.departures["contacts"] - before.departures["contacts"]).sum(axis=0)
+    return together.var(axis=0, ddof=1) + contacts, (together,)
 
 
 def apart(before: CurveCondition, after: CurveCondition) -> tuple[np.ndarray, Sequence[np.ndarray]]:
@@ -108,7 +109,8 @@ def apart(before: CurveCondition, after: CurveCondition) -> tuple[np.ndarray, Se
         sum(one.departures[source].var(axis=0, ddof=1) for one in (before, after)) for source in ("all", "body")
     )
     shared = (after.departures["shared"] - before.departures["shared"]).var(axis=0, ddof=1)
-    return np.maximum(of_all - of_body, 0.0) + shared, (before.departures["all"], after.departures["all"])
+    contacts = sum(np.square(one.departures["contacts"]).sum(axis=0) for one in (before, after))
+    return np.maximum(of_all - of_body, 0.0) + shared + contacts, (before.departures["all"], after.departures["all"])
 
 
 def curve_changes(before: Rows, after: Rows, measured: Measured) -> Iterator[CurveChange]:
@@ -159,7 +161,7 @@ def _condition(curves: np.ndarray, drawn: Mapping[str, np.ndarray]) -> CurveCond
     spread = np.zeros(len(PERCENT))
     if len(curves) > 1:
         spread = spread_beyond(curves, drawn["all"])
-    departed = {source: own - own.mean(axis=0) for source, own in means.items()}
+    departed = {source: own - (0.0 if source == "contacts" else own.mean(axis=0)) for source, own in means.items()}
     return CurveCondition(curves.mean(axis=0), len(curves), departed, residuals, spread)
 
 

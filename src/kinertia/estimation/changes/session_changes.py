@@ -153,9 +153,11 @@ def _apart(fixed_axes: bool, outcome: str, before: Condition, after: Condition) 
     """Return variances of a difference between sessions."""
     each = {source: _variance(before, source) + _variance(after, source) for source in ("all", "body", "instruments")}
     shared = float(np.var(after.drawn["shared"] - before.drawn["shared"], ddof=1))
+    contacts = sum(float(np.square(one.drawn["contacts"]).sum()) for one in (before, after))
     parts = parts_of(max(each["all"] - each["body"], 0.0) + shared, each["instruments"], shared)
     if fixed_axes and outcome.startswith(_BY_AXES):
         parts["markers"] *= _FIXED_AXES**2
+    parts["markers"] += contacts
     return parts
 
 
