@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
+from kinertia.estimation.simultaneous.instruments.instrument_errors import GAIN, CalibrationEntry
 from kinertia.estimation.simultaneous.markers.skin import OTHER_EXPECTED_SD_M
 from kinertia.estimation.simultaneous.observation import FORCE_SD_OF_WEIGHT
 from kinertia.io.recording import read_recording
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.settings import Settings, Subject
 from kinertia.trial.trial_input import TrialInput
-from kinertia.workflow.estimate import estimate_bsp
+from kinertia.workflow.estimate import estimate_bsp, light_plates
 from recordings import FITTED, slow_beside
 
 walks = pytest.mark.parametrize("name", slow_beside(("synthetic", "gait2354"), FITTED))
@@ -158,3 +159,27 @@ def test_settings_and_subject_reach_the_result(c3d_lab, short_fit):
     assert [stage for stage, _ in shares][:2] == ["calibration", "inverse kinematics"]
     assert shares[-1][0] == "estimate"
     assert all(0 <= share <= 1 for _, share in shares)
+
+
+def gain(plate: str, value: float, sd: float, trial: str | None = "walk") -> CalibrationEntry:
+    return CalibrationEntry(
+        kind="plate", plate=plate, trial=trial, quantity=GAIN, value=value, prior_sd=0.003, sd=sd, unit="1"
+    )
+
+
+@pytest.mark.parametrize(
+    ("gains", "light"),
+    [
+        ([gain("plate 1", -0.042, 0.010), gain("plate 2", -0.033, 0.006)], set()),  # Plug-in Gait, subject B
+        ([gain("plate 1", -0.120, 0.010), gain("plate 2", -0.033, 0.006)], {"plate 1"}),
+        ([gain("plate 1", -0.042, 0.010), gain("plate 2", 0.001, 0.006)], {"plate 1"}),
+        ([gain("plate 1", -0.042, 0.010)], {"plate 1"}),
+        ([gain("plate 1", 0.042, 0.010), gain("plate 2", 0.1, 0.006)], set()),
+        (
+            [gain("plate 1", -0.042, 0.010), gain("plate 1", 0.0, 0.003, None), gain("plate 2", 0.0, 0.003, None)],
+            {"plate 1"},
+        ),
+    ],
+)
+def test_a_plate_is_light_where_it_reads_less_than_the_others(gains, light):
+    assert light_plates(gains) == light

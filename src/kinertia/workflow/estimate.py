@@ -16,7 +16,7 @@ from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.trial_fit import JointCurves, TrialFit
 from kinertia.estimation.simultaneous.fit import Posterior, SimultaneousFit, fit_simultaneous
-from kinertia.estimation.simultaneous.instruments.instrument_errors import GAIN
+from kinertia.estimation.simultaneous.instruments.instrument_errors import GAIN, INTERVAL_SD, CalibrationEntry
 from kinertia.estimation.simultaneous.instruments.priors import ModelUncertainty
 from kinertia.estimation.simultaneous.linear_algebra.motion_basis import Bandwidth
 from kinertia.estimation.simultaneous.terms.cost_term import CostTerm
@@ -355,14 +355,25 @@ def without_gains_of_missing_loads(ready: Prepared, fitted: SimultaneousFit) -> 
     """Return the person with incomplete plates: of their contacts, part of the load is missing.
 
     A plate is incomplete where the estimate shows it, or where a foot extends beyond its edge and it seems to read too
-    little. None if there is none.
+    little: not where all plates of a trial do, since then the person weighs less. None if there is none.
     """
     beyond = {one.where.plate for one in ready.findings if one.code == _BEYOND_EDGE}
-    light = {
-        one.plate for one in fitted.posterior.instrument_errors if one.quantity == GAIN and one.found and one.value < 0
-    }
+    light = light_plates(fitted.posterior.instrument_errors)
     incomplete = {one.plate for one in fitted.posterior.missing_loads} | {name for name in beyond & light if name}
     if not incomplete:
         return None
     instruments = replace(ready.uncertainty.instruments, incomplete=frozenset(incomplete))
     return replace(ready, uncertainty=replace(ready.uncertainty, instruments=instruments))
+
+
+def light_plates(errors: Sequence[CalibrationEntry]) -> set[str | None]:
+    """Return the plates that read too little, in all trials or in one, by more than another plate there does."""
+    gains = [one for one in errors if one.quantity == GAIN]
+    light = set()
+    for one in gains:
+        others = [other for other in gains if other.trial == one.trial and other.plate != one.plate]
+        most = max(others, key=lambda other: other.value, default=None)
+        alone = most is None or most.value - one.value > INTERVAL_SD * float(np.hypot(one.sd, most.sd))
+        if one.found and one.value < 0.0 and alone:
+            light.add(one.plate)
+    return light
