@@ -64,7 +64,7 @@ NOT_TRIED = {
     "P216": "level moment",
     "P221": "gain",
     "P222": "large larger small smaller",
-    "P232": "moment opposed",
+    "P232": "away moment opposed",
     "P233": "best reversed_share",
     "P236": "best misread",
     "P241": "far",

@@ -14,7 +14,7 @@ from kinertia.findings.quantity import Where
 from kinertia.io.marker_set_file import choose_marker_set
 from loads_and_feet import on_one_plate
 from plate_findings import codes, context_of, found_in, with_force
-from recordings import QUICK_WALKS, RUNS, SQUATS, WALKS, here, marker_set_for, slow_beside
+from recordings import QUICK_WALKS, RUNS, SQUATS, WALKS, here, marker_set_for, named_here, slow_beside
 
 
 @pytest.fixture(params=slow_beside(QUICK_WALKS, WALKS))
@@ -180,6 +180,21 @@ def test_signs_in_a_run(run, signs, code, axis):
 def test_rotated_forces(walk, angle):
     turn = Rotation.from_euler("y", angle, degrees=True).as_matrix()
     (found,) = [*force_directions(context_of(with_force(walk, lambda force: force @ turn.T)))]
+    assert found.code == "P231"
+    assert np.degrees(found.evidence["angle_rad"].value) == pytest.approx(angle)
+
+
+CLINICS = named_here({"fmc": ("field/fmc/MH0222_BP06.c3d", None), "sydney": ("field/sydney/S4-AMGait03.c3d", None)})
+
+
+@pytest.mark.parametrize("name", CLINICS)
+@pytest.mark.parametrize("angle", [90, -90])
+def test_rotated_forces_where_sideways_and_forward_velocities_go_together(recording_of, name, angle):
+    """Of rotated forces, one axis opposes the motion there, and the other agrees with it."""
+    turn = Rotation.from_euler("y", angle, degrees=True).as_matrix()
+    recording = recording_of(*CLINICS[name])
+    assert [*force_directions(context_of(recording))] == []
+    (found,) = [*force_directions(context_of(with_force(recording, lambda force: force @ turn.T)))]
     assert found.code == "P231"
     assert np.degrees(found.evidence["angle_rad"].value) == pytest.approx(angle)
 

@@ -25,15 +25,17 @@ from kinertia.diagnostics.evidence.body_motion import (
     rotated_residual,
 )
 from kinertia.diagnostics.evidence.force_mass import loaded_wrenches
+from kinertia.diagnostics.plates.forces_of_steps import AWAY, MUCH_SMALLER, forces_of_steps, moment_reversed
 from kinertia.diagnostics.runner import NEEDS_VELOCITY, NEEDS_VERTICAL_FORCE, check
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Limit, Quantity
 from kinertia.findings.rule import rule
 from kinertia.trial.data import LOAD_THRESHOLD_N, PlateLoads, Trial
-from kinertia.trial.ground_contact import FIRM_LOAD_N, free_moment
-from kinertia.trial.sampled_data import rms, span_s
+from kinertia.trial.ground_contact import free_moment
+from kinertia.trial.sampled_data import span_s
 
 _OPPOSED = Limit(-0.4, usual=(0.5, 1.0))
+_SHORTEST_S = 0.5
 _CLEAR, _CLEAR_ROTATION, _ROTATED_DEG = 0.7, 0.35, 60.0
 _ONE_REVERSED, _LEAST_REVERSED_M_S, _LONG_WINDOW_S = Limit(0.65), 0.08, 1.0
 """Where one plate's sign is wrong, reversing it leaves 0.04 to 0.57 of the residual on five trials; on nine fault-free
@@ -41,7 +43,6 @@ ones 0.9 (squats), 1.4 (runs) and more."""
 _ONE_MISREAD = Limit(0.8)
 """Where one plate's axes are exchanged or rotated, undoing it leaves 0.06 to 0.78 on 19 walks, on fault-free ones 1 and
 more."""
-_MUCH_SMALLER = Limit(0.5)
 _LEAST_PUSH, _USUAL_PUSH = 0.02, (0.08, 0.3)
 _VERTICAL_SHARE = 0.7
 """Share of the largest force; a foot pushes sideways and backwards by less."""
@@ -66,7 +67,8 @@ class _Hypothesis:
     "P236",
     unless=NEEDS_VELOCITY,
     opposed=_OPPOSED,
-    moment=_MUCH_SMALLER,
+    away=AWAY,
+    moment=MUCH_SMALLER,
     reversed_share=_ONE_REVERSED,
     misread=_ONE_MISREAD,
     best=CLEARLY_BEST,
@@ -76,8 +78,12 @@ def force_directions(context: RecordingContext) -> Iterator[Finding]:
     causes.
 
     One about both axes is weighed against the best of each axis. Without strides the trunk bends: then pelvis and
-    marker-based centre must both oppose the forces, and only a wrong sign of all forces is considered.
+    marker-based centre must both oppose the forces, and only a wrong sign of all forces is considered. Without
+    velocities the forces of steps must point to the body.
     """
+    if max((span_s(part.time) for part in context.velocities), default=0.0) < _SHORTEST_S:
+        yield from forces_of_steps(context)
+        return
     trial, plates, parts, changes = context.trial, context.plates, context.velocities, context.velocity_changes
     if trial is None or plates is None or changes is None:
         return
@@ -115,14 +121,16 @@ def _rotated(
     """Report P231: rotated by 180 degrees where both axes oppose the motion, else by the angle at which forces follow
     it."""
     angle_deg, strength = _angle(changes)
-    # beside an opposed axis, one that agrees with the markers shows that the forces are not rotated
-    enough = -_OPPOSED if against else _CLEAR
-    fitting = any(one > enough for one in correlations.values())
     if len(against) == len(HORIZONTAL):
         angle, residual = np.pi, float(np.linalg.norm([one.all_reversed for one in residuals.values()]))
-    elif context.has_strides and strength > _CLEAR_ROTATION and abs(angle_deg) > _ROTATED_DEG and not fitting:
+    elif context.has_strides and strength > _CLEAR_ROTATION and abs(angle_deg) > _ROTATED_DEG:
         angle = float(np.radians(90 * round(angle_deg / 90)))
         residual = rotated_residual(context.velocities, angle)
+        # beside an opposed axis, one that agrees with the markers mostly shows that the forces are not rotated
+        enough = -_OPPOSED if against else _CLEAR
+        by_signs = np.linalg.norm([min(one.as_read, one.all_reversed) for one in residuals.values()])
+        if any(one > enough for one in correlations.values()) and residual > CLEARLY_BEST * by_signs:
+            return None
     else:
         return None
     found = finding(
@@ -142,27 +150,9 @@ def _reversed_axis(context: RecordingContext, residual: VelocityResidual, correl
         context.at(**context.along(axis)),
         correlation=Quantity(correlation, "1", limit=_OPPOSED, usual=_OPPOSED.usual),
         velocity_residual_m_s=residual.evidence(residual.all_reversed, residual.as_read),
-        beside=Quantity(" and the vertical moment" if _moment_reversed(context.plates, axis) else ""),
+        beside=Quantity(" and the vertical moment" if moment_reversed(context.plates, axis) else ""),
     )
     return _Hypothesis(found, residual.all_reversed)
-
-
-def _moment_reversed(plates: PlateLoads | None, axis: int) -> bool:
-    """Return whether the vertical moments of all plates are reversed like the forces along an axis: free moments are
-    small, and about the middle of a plate a vertical moment of the wrong sign leaves twice that of the forces."""
-    if plates is None or plates.corners is None:
-        return False
-    middle = plates.corners.mean(axis=1)[None]
-    force = plates.force * np.where(np.arange(3) == axis, -1.0, 1.0)
-    about = plates.moment - np.cross(middle, plates.force)
-    loaded = plates.force[..., 1] > FIRM_LOAD_N
-    if not loaded.any():
-        return False
-    left_nm = [
-        rms(free_moment(np.concatenate([force, about * [1.0, sign, 1.0] + np.cross(middle, force)], axis=2))[loaded])
-        for sign in (1.0, -1.0)
-    ]
-    return left_nm[1] < _MUCH_SMALLER * left_nm[0]
 
 
 @check("P238", unless=NEEDS_VERTICAL_FORCE)
