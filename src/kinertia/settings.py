@@ -118,18 +118,6 @@ def sex_of(value: object) -> object:
     return next((sex for sex in known if word and word in (sex, sex[0])), value)
 
 
-def number_of(text: str) -> float:
-    """Parse a number written by hand, with a decimal point or a decimal comma.
-
-    Raises:
-        ValueError: the text is not a number.
-    """
-    try:
-        return float(text.replace(",", ".") if text.count(",") == 1 and "." not in text else text)
-    except ValueError:
-        raise ValueError(f"'{text}' is not a number; write it like 72.6") from None
-
-
 Cutoff = Annotated[float | Literal["gcv"], BeforeValidator(_cutoff)]
 ForceCutoff = Annotated[float | Literal["auto", "none"], BeforeValidator(_force_cutoff)]
 

@@ -14,10 +14,9 @@ from hypothesis import strategies as st
 from kinertia.report.figures.body_figure import body_figure
 from kinertia.report.figures.bsp_figures import change_figure, departure_figure, departures, information_figure
 from kinertia.report.figures.coordinate_titles import panels_of, title_of
-from kinertia.report.figures.figure import Figure, Panel, compact, small_multiples
+from kinertia.report.figures.figure import BLUE, SIDES, Figure, Panel, between, compact, faded, small_multiples
 from kinertia.report.figures.marker_figures import fit_gap_figure, marker_figure
 from kinertia.report.figures.plots import as_plotly
-from kinertia.report.figures.style import BLUE, SIDES, between, faded
 from kinertia.report.figures.time_figures import (
     BAND_EVERY,
     coordinate_figure,

@@ -25,7 +25,8 @@ from kinertia.diagnostics.runner import unknown_codes
 from kinertia.errors import BlockedError, FileError, KinertiaError, findings_of
 from kinertia.findings.rule import matching
 from kinertia.io.output_folder import check_folder, expect_own_folder
-from kinertia.settings import Overrule, number_of, sex_of
+from kinertia.io.text.number_table import number_of
+from kinertia.settings import Overrule, sex_of
 
 if TYPE_CHECKING:
     from rich.console import Capture

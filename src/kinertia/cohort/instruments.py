@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kinertia.estimation.simultaneous.instruments.instrument_errors import GAIN, SHOWN_UNIT, item_text, quantity_text
-from kinertia.report.figures import style
-from kinertia.report.figures.figure import Panel, plain, small_multiples
+from kinertia.report.figures.figure import BLACK, BLUE, GREEN, ORANGE, SKY, VERMILION, Panel, plain, small_multiples
 from kinertia.report.pages.rendering import Part
 
 if TYPE_CHECKING:
@@ -29,7 +28,7 @@ COLUMNS = (
     "unit",
     "with_session",
 )
-_COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.ORANGE, style.SKY, style.BLACK)
+_COLOURS = (BLUE, VERMILION, GREEN, ORANGE, SKY, BLACK)
 _WITHIN = 1.96
 _UNDATED = (
     "No date is known: neither the recordings (TRIAL:DATE in C3D files, TIME_STAMP in Qualisys files) nor the subject "

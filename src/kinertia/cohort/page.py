@@ -26,10 +26,9 @@ from kinertia.findings.rule import matching, rule
 from kinertia.io.output_folder import write_then_rename
 from kinertia.model.bsp import PARAMETERS
 from kinertia.motion.gait_cycle import PERCENT
-from kinertia.report.figures import style
 from kinertia.report.figures.bsp_figures import NAMES, segment_name
 from kinertia.report.figures.cycle_figures import band, mean_line
-from kinertia.report.figures.figure import Figure, Panel, bar_figure, dot_figure, small_multiples
+from kinertia.report.figures.figure import BLUE, SIDES, Figure, Panel, bar_figure, dot_figure, faded, small_multiples
 from kinertia.report.pages.finding_view import linked
 from kinertia.report.pages.rendering import Part, render_parts
 
@@ -160,7 +159,7 @@ def _score_row(person: str, own: pd.DataFrame) -> tuple[float, tuple[str, ...]]:
     farthest = ""
     if len(variables):
         worst = variables.iloc[int(variables["degrees"].argmax())]
-        farthest = f"{worst['variable']}, {style.SIDES[worst['side']][0]}: {worst['degrees']:.1f}"
+        farthest = f"{worst['variable']}, {SIDES[worst['side']][0]}: {worst['degrees']:.1f}"
     overall = float(gps.get("both", np.nan))
     cells = (*(_degrees(float(gps.get(side, np.nan))) for side in ("both", "r", "l")), farthest)
     return overall if np.isfinite(overall) else -1.0, (report_of(person), *cells, str(own["remarks"].iloc[0]))
@@ -200,8 +199,8 @@ def _curves(sums: Mapping[tuple[str, str, str], np.ndarray]) -> Figure:
         total = np.where(every[:, :1] > 0, every, np.nan)  # gaps where nobody was measured
         mean = total[:, 1] / total[:, 0]
         sd = np.sqrt(np.maximum(total[:, 2] / total[:, 0] - mean**2, 0.0))
-        spread = {**band(mean - sd, mean + sd, style.faded(style.BLUE, 0.2)), "name": "mean ± SD"}
-        line = {**mean_line(mean), "name": "mean", "line": {"color": style.BLUE}}
+        spread = {**band(mean - sd, mean + sd, faded(BLUE, 0.2)), "name": "mean ± SD"}
+        line = {**mean_line(mean), "name": "mean", "line": {"color": BLUE}}
         named = f"{task}: {title}" if several and task else title
         panels.append(Panel(f"{named} ({_CURVES[quantity]})", [spread, line]))
     return small_multiples(panels, "Mean curves over the gait cycle.", {"range": [0, 100]})

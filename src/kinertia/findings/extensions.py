@@ -1,4 +1,4 @@
-"""Finds what other installed packages add, by their entry points: marker sets, readers of files, rules.
+"""Finds what is loaded by name: what other packages add by entry points (marker sets, readers, rules), and the report.
 
 | group | name of the entry point | object |
 |---|---|---|
@@ -12,11 +12,13 @@ An object is loaded when it is needed. Names that Kinertia has itself stay its o
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
 
 MARKER_SETS, READERS, RULES = "kinertia.marker_sets", "kinertia.readers", "kinertia.rules"
+_SHOWN_BY = "kinertia.report.display"
 
 
 class ExtensionError(Exception):
@@ -68,3 +70,9 @@ def loaded(group: str, name: str) -> Any:
 @cache
 def _points(group: str) -> dict[str, EntryPoint]:
     return {point.name: point for point in entry_points(group=group)}
+
+
+def report_function(name: str) -> Callable[..., Any]:
+    """Return the function of this name that shows or saves data."""
+    function: Callable[..., Any] = getattr(import_module(_SHOWN_BY), name)
+    return function

@@ -1,4 +1,4 @@
-"""Shows and saves trials and fits: what their methods ask for through `kinertia.trial.display`."""
+"""Shows and saves trials and fits: what their methods ask for through `kinertia.findings.extensions`."""
 
 from pathlib import Path
 from typing import Any

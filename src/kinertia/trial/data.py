@@ -17,9 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from kinertia.errors import MarkerSetError, TrialError
+from kinertia.findings.extensions import report_function
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity, Where
-from kinertia.trial.display import of_report
 from kinertia.trial.file_contents import Belt, FileEvent, FileOutputs, StatedContact, TorqueColumns
 from kinertia.trial.plate_signals import ForceSpike, UnloadedReading
 from kinertia.trial.sampled_data import impossible_markers, impossible_plates, nearest_samples, windows, within
@@ -249,7 +249,7 @@ class Recording:
 
     def _repr_html_(self) -> str:
         """Return the HTML summary for a notebook: frames, markers and their gaps, force plates, notes."""
-        html: str = of_report("recording_html")(self)
+        html: str = report_function("recording_html")(self)
         return html
 
 
@@ -369,7 +369,7 @@ class Trial:
 
     def _repr_html_(self) -> str:
         """Return the HTML summary for a notebook: frames, markers and their gaps, measured windows, notes."""
-        html: str = of_report("trial_html")(self)
+        html: str = report_function("trial_html")(self)
         return html
 
     def rotated(self, rotation: FloatArray) -> Trial:

@@ -9,7 +9,7 @@ from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Joint
 from kinertia.report.figures.body_figure import body_figure
 from kinertia.report.figures.bsp_figures import segment_name
-from kinertia.report.figures.style import between
+from kinertia.report.figures.figure import between
 
 
 def changed(fit, segment, column, change):

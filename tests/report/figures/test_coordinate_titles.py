@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from kinertia.estimation.result.fit import Fit
-from kinertia.report.figures import style
 from kinertia.report.figures.coordinate_titles import convention_of, panels_of, title_of
 from kinertia.report.figures.cycle_figures import cycle_figures
+from kinertia.report.figures.figure import BLACK, COMPARED, SIDES
 from kinertia.report.figures.time_figures import joint_moment_figure
 
 LEGS = ("hip_flexion", "hip_adduction", "hip_rotation", "knee_angle", "ankle_angle", "subtalar_angle")
@@ -141,6 +141,6 @@ def test_an_imported_model_keeps_its_own_signs_unless_one_states_others(fit):
 
 
 def test_no_result_that_is_compared_has_the_colour_of_a_side():
-    sides = {colour for _, colour in style.SIDES.values() if colour != style.BLACK}
-    assert not sides & set(style.COMPARED)
-    assert len(set(style.COMPARED)) == len(style.COMPARED)
+    sides = {colour for _, colour in SIDES.values() if colour != BLACK}
+    assert not sides & set(COMPARED)
+    assert len(set(COMPARED)) == len(COMPARED)

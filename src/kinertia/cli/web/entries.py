@@ -23,8 +23,9 @@ from kinertia.io.output_folder import write_then_rename
 from kinertia.io.subject.draft import init_subject
 from kinertia.io.subject.reader import read_subject
 from kinertia.io.subject.tables import subject_text
+from kinertia.io.text.number_table import number_of
 from kinertia.io.text.toml_lines import parse_toml, read_toml
-from kinertia.settings import Subject, number_of, sex_of
+from kinertia.settings import Subject, sex_of
 
 _HEADING = "Written by kinertia app; `kinertia fit` takes it as it is."
 _LABELS = {

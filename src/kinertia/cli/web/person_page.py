@@ -1,24 +1,32 @@
-"""Assembles the page of one person: files, subject, findings of the check, results."""
+"""Assembles the page of one person: files, subject, findings of the check, results, letter, comparisons."""
 
 import os
 import re
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
+from kinertia.cli.learning import norms_text
 from kinertia.cli.web.entries import CONDITION, USE, conditions, entries, fields, label_of, marker_set_field, trouble
 from kinertia.cli.web.file_table import file_table
 from kinertia.cli.web.jobs import KINDS, Job, Jobs
-from kinertia.cli.web.library import LIMITS, PersonFolder
+from kinertia.cli.web.library import LIMITS, Library, PersonFolder
 from kinertia.cli.web.responses import page, time_left
 from kinertia.cli.web.rows import rows as rows_of
 from kinertia.errors import KinertiaError
+from kinertia.estimation.result.mean_cycles import Control, band_columns
+from kinertia.io.norms_file import read_norms
+from kinertia.io.output_folder import write_then_rename
 from kinertia.model.marker_set import SEGMENTS
+from kinertia.report.comparison.side_by_side import render_comparison
+from kinertia.report.comparison.what_changed import compare, compared_sessions
+from kinertia.report.exports.saved_fit import load_fit, read_saved
 from kinertia.report.pages.finding_view import LOOKS
+from kinertia.report.pages.page import render
 
 _ENDED = {
     "cancelled": "Cancelled.",
@@ -208,3 +216,41 @@ def explained(person: PersonFolder, trouble: str) -> Explanation:
     if missing := _MISSING.search(exact):
         return Explanation(f"{label_of(missing[1])} is missing: fill it in, then save and check.", exact)
     return Explanation(next((plain for pattern, plain in _PLAIN if pattern.search(exact)), ""), exact)
+
+
+def letter(person: PersonFolder, library: Library) -> str:
+    """Render the two pages for a patient's file, with the library's norms if it has any."""
+    saved = read_saved(person.results)
+    norms = read_norms(library.norms) if library.norms.is_file() else {}
+    return render(saved.fit, saved.provenance, saved.versions, norms, saved.truth, template="letter")
+
+
+def people_compared(people: Sequence[PersonFolder], library: Library) -> str:
+    """Render what changed between two results, and several side by side."""
+    fits = {person.name: load_fit(person.results) for person in people}
+    found, reason = compared_sessions(list(fits.values()), norms=library.norms if library.norms.is_file() else None)
+    return render_comparison(fits, None if found is None else found.shown(), reason)
+
+
+def conditions_compared(person: PersonFolder, conditions: tuple[str, str], library: Library) -> str:
+    """Render what changed between two conditions of one session."""
+    norms = library.norms if library.norms.is_file() else None
+    return compare(person.results, conditions=conditions, norms=norms).page()
+
+
+def make_norms(people: Sequence[PersonFolder], library: Library) -> None:
+    """Write the library's norms from the results of these people, one per control.
+
+    Raises:
+        KinertiaError: a person has no strides, two results are of one recording, models differ, or there is one person.
+    """
+    controls: list[Control] = []
+    seen: dict[str, str] = {}
+    for person in people:
+        saved = read_saved(person.results)
+        files = {} if saved.provenance is None else dict.fromkeys(saved.provenance.files.values(), person.name)
+        if again := [seen[one] for one in files if one in seen]:
+            raise KinertiaError(f"{person.name} and {again[0]} share recordings: choose each control once")
+        seen |= files
+        controls.append(Control.of(saved.fit))
+    write_then_rename(library.norms, norms_text(band_columns(controls)))

@@ -281,7 +281,7 @@ class _Actions:
 
     async def compared(self, request: Request) -> Response:
         """Serve what `kinertia compare` writes about them."""
-        from kinertia.cli.web.result_pages import people_compared
+        from kinertia.cli.web.person_page import people_compared
         from kinertia.report.comparison.side_by_side import MOST_FITS
 
         chosen = self._chosen(request)
@@ -291,7 +291,7 @@ class _Actions:
 
     async def letter(self, request: Request) -> Response:
         """Serve the letter of a person, to be printed."""
-        from kinertia.cli.web.result_pages import letter
+        from kinertia.cli.web.person_page import letter
 
         person = self._person(request)
         if not person.fitted:
@@ -300,7 +300,7 @@ class _Actions:
 
     async def conditions(self, request: Request) -> Response:
         """Serve the comparison of two conditions of a person."""
-        from kinertia.cli.web.result_pages import conditions_compared
+        from kinertia.cli.web.person_page import conditions_compared
 
         person, asked = self._person(request), request.query_params
         if not person.fitted:
@@ -310,7 +310,7 @@ class _Actions:
 
     async def norms(self, request: Request) -> Response:
         """Make the library's norms from the results of the chosen people."""
-        from kinertia.cli.web.result_pages import make_norms
+        from kinertia.cli.web.person_page import make_norms
 
         names = dict.fromkeys(value for key, value in await pairs(request) if key == "person")
         chosen = self._fitted(names)

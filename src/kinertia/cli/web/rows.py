@@ -10,7 +10,8 @@ from typing import Any, Literal, get_args, get_origin
 
 from kinertia.cli.web.file_table import Content
 from kinertia.errors import SettingsError
-from kinertia.settings import Attached, KnownSegment, Table, number_of
+from kinertia.io.text.number_table import number_of
+from kinertia.settings import Attached, KnownSegment, Table
 
 _SEGMENT = "segment"
 _TABLES: dict[str, type[Table]] = {"segment": KnownSegment, "attached": Attached}

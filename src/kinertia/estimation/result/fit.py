@@ -27,6 +27,7 @@ from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.estimation.simultaneous.fit import Posterior
 from kinertia.estimation.simultaneous.instruments.instrument_errors import calibration_columns
 from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import asymmetries, asymmetry_columns
+from kinertia.findings.extensions import report_function
 from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.overview import Overview
 from kinertia.io.norms_file import read_norms
@@ -35,7 +36,6 @@ from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.imported_model import OsimModel
 from kinertia.model.skeleton import Skeleton
 from kinertia.settings import Settings, Subject
-from kinertia.trial.display import of_report
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -228,7 +228,7 @@ class Fit:
         Raises:
             FileError: the folder holds such files, or cannot be written to.
         """
-        written: Path = of_report("save_fit")(self, folder, force=force)
+        written: Path = report_function("save_fit")(self, folder, force=force)
         return written
 
     def figure(self, name: str, path: str | Path, trial: str | None = None) -> Path:
@@ -245,7 +245,7 @@ class Fit:
                 `plots`) is missing.
             FileError: the format is not known, or the file cannot be written.
         """
-        written: Path = of_report("save_figure")(self, name, path, trial)
+        written: Path = report_function("save_figure")(self, name, path, trial)
         return written
 
     def to_xarray(self, kind: Kind = "moment", over: Literal["percent", "time"] = "percent") -> Dataset:
@@ -266,7 +266,7 @@ class Fit:
             >>> knee.value.attrs["units"]
             'N m/kg'
         """
-        return of_report("curve_dataset")(self, kind, over)
+        return report_function("curve_dataset")(self, kind, over)
 
     def gps(self, norms: str | Path) -> GaitProfile:
         """Compute Gait Profile Score and Movement Analysis Profile (Baker 2009) against norms, in degrees.
@@ -278,7 +278,7 @@ class Fit:
             KinertiaError: norms have another convention or lack a variable, or there are no strides.
             FileError: the norms cannot be read.
         """
-        result: GaitProfile = of_report("scored")(self, norms)
+        result: GaitProfile = report_function("scored")(self, norms)
         return result
 
     def draws_to_xarray(self, count: int = 50, seed: int = 0) -> Dataset:
@@ -295,7 +295,7 @@ class Fit:
         Raises:
             KinertiaError: xarray is missing, or fewer draws are stored.
         """
-        return of_report("draw_dataset")(self, count, seed)
+        return report_function("draw_dataset")(self, count, seed)
 
     @property
     def covariance(self) -> pd.DataFrame | None:
@@ -334,7 +334,7 @@ class Fit:
     @property
     def plot(self) -> FitPictures:
         """Figures for a notebook: `fit.plot.moments()`, `.bsp()`, `.residuals()`, `.skeleton()` and others."""
-        pictures: FitPictures = of_report("pictures")(self)
+        pictures: FitPictures = report_function("pictures")(self)
         return pictures
 
     def __repr__(self) -> str:
@@ -344,5 +344,5 @@ class Fit:
 
     def _repr_html_(self) -> str:
         """Return the HTML summary for a notebook: verdict, warnings, body segment parameters."""
-        html: str = of_report("fit_html")(self)
+        html: str = report_function("fit_html")(self)
         return html

@@ -15,6 +15,7 @@ import numpy as np
 
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.uncertainty.model_errors import with_drawn_knees
+from kinertia.findings.extensions import report_function
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, inverse_dynamics
@@ -22,7 +23,6 @@ from kinertia.motion.gait_cycle import Stride, contact_phases, strides_of
 from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.joint_moments import BodyJoint, JointMoments, body_joints, joint_moments
 from kinertia.motion.kinematics import Kinematics
-from kinertia.trial.display import of_report
 from kinertia.trial.trial_input import WITHOUT_STRIDES
 
 if TYPE_CHECKING:
@@ -232,7 +232,7 @@ class TrialFit:
 
     def _repr_html_(self) -> str:
         """Return the HTML summary for a notebook: frames used, marker distances, residuals."""
-        html: str = of_report("trial_fit_html")(self)
+        html: str = report_function("trial_fit_html")(self)
         return html
 
 

@@ -60,9 +60,10 @@ from kinertia.findings.quantity import Quantity
 from kinertia.io.file_names import trouble_as_folders
 from kinertia.io.subject.provenance import command_line
 from kinertia.io.subject.tables import TABLES, CodedError, StudyFile, SubjectFile, shown
+from kinertia.io.text.number_table import number_of
 from kinertia.io.text.toml_lines import Location, TomlFile, read_toml
 from kinertia.model.anthropometry import check_subject
-from kinertia.settings import Diagnostics, Settings, Table, number_of
+from kinertia.settings import Diagnostics, Settings, Table
 
 T = TypeVar("T", bound=Table)
 STUDY_FILE = "kinertia.toml"

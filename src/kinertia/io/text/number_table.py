@@ -288,3 +288,15 @@ def most_seen(path: Path, labels: Sequence[str], seen: BoolArray) -> tuple[dict[
             evidence = {"count": Quantity(times, "1"), "label": Quantity(label)}
             findings.append(with_evidence("F113", Where(path.name, markers=(label,)), evidence, Severity.INFO))
     return chosen, findings
+
+
+def number_of(text: str) -> float:
+    """Parse a number written by hand, with a decimal point or a decimal comma.
+
+    Raises:
+        ValueError: the text is not a number.
+    """
+    try:
+        return float(text.replace(",", ".") if text.count(",") == 1 and "." not in text else text)
+    except ValueError:
+        raise ValueError(f"'{text}' is not a number; write it like 72.6") from None

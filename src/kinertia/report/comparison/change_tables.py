@@ -9,10 +9,20 @@ import numpy as np
 from kinertia.estimation.changes.change import MOST_WALKS, NOTABLE, PRIMARY, SOURCES, Change
 from kinertia.estimation.changes.curve_changes import CurveChange
 from kinertia.estimation.changes.group_changes import GroupChange
-from kinertia.report.figures import style
 from kinertia.report.figures.cycle_figures import band, mean_line
-from kinertia.report.figures.figure import Figure, Panel, plain, shaded, small_multiples, written
-from kinertia.report.figures.style import SIDES
+from kinertia.report.figures.figure import (
+    COMPARED,
+    GREEN,
+    GREY,
+    SIDES,
+    Figure,
+    Panel,
+    faded,
+    plain,
+    shaded,
+    small_multiples,
+    written,
+)
 from kinertia.report.wording import INTERVAL_SD
 from kinertia.trial.sampled_data import runs
 
@@ -256,10 +266,10 @@ def joint_figure(curves: Sequence[CurveChange], title: str, before: str, after: 
 def _both(one: CurveChange, before: str, after: str) -> Panel:
     traces: list[dict[str, Any]] = []
     for name, mean, sd, colour in (
-        (before, one.before, one.before_sd, style.COMPARED[0]),
-        (after, one.after, one.after_sd, style.COMPARED[1]),
+        (before, one.before, one.before_sd, COMPARED[0]),
+        (after, one.after, one.after_sd, COMPARED[1]),
     ):
-        traces.append(band(mean - INTERVAL_SD * sd, mean + INTERVAL_SD * sd, style.faded(colour, _OPACITY)))
+        traces.append(band(mean - INTERVAL_SD * sd, mean + INTERVAL_SD * sd, faded(colour, _OPACITY)))
         traces.append({**mean_line(mean), "name": plain(name), "line": {"color": colour, "width": 2}})
     return Panel(f"{_words(one)} ({one.unit})", traces)
 
@@ -268,19 +278,19 @@ def _difference(one: CurveChange) -> Panel:
     low, high = one.band
     traces: list[dict[str, Any]] = []
     if np.isfinite(one.factor):
-        traces.append(band(low, high, style.faded(style.GREY, _OPACITY)))
-    traces.append({**mean_line(one.difference), "name": "difference", "line": {"color": style.GREY, "width": 2}})
+        traces.append(band(low, high, faded(GREY, _OPACITY)))
+    traces.append({**mean_line(one.difference), "name": "difference", "line": {"color": GREY, "width": 2}})
     return Panel(f"Difference: {_words(one)}", traces, shapes=list(_shown(one)))
 
 
 def _shown(one: CurveChange) -> Iterator[dict[str, Any]]:
     """Shade where the band leaves out zero."""
     for first, last in runs(one.changed):
-        yield shaded(float(first), float(last), style.faded(style.GREEN, _SHADE))
+        yield shaded(float(first), float(last), faded(GREEN, _SHADE))
 
 
 def _words(one: CurveChange) -> str:
-    side = f"{style.SIDES[one.side][0]} " if one.side else ""
+    side = f"{SIDES[one.side][0]} " if one.side else ""
     during = ", stance" if one.phase == "stance" else ""
     text = f"{side}{one.joint} {one.component}{during}".replace("_", " ")
     return text[0].upper() + text[1:]

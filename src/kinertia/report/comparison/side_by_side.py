@@ -13,11 +13,10 @@ import numpy as np
 from kinertia.estimation.result.cycles import UNITS as UNITS_OF_CURVES
 from kinertia.estimation.result.fit import Fit
 from kinertia.model.bsp import PARAMETERS, UNITS
-from kinertia.report.figures import style
 from kinertia.report.figures.bsp_figures import NAMES, segment_name
 from kinertia.report.figures.coordinate_titles import load_title, panels_of, same_segment, same_sign
 from kinertia.report.figures.cycle_figures import estimated_curves, mean_curve, mean_line
-from kinertia.report.figures.figure import Figure, Panel, plain, small_multiples, written
+from kinertia.report.figures.figure import COMPARED, SIDES, Figure, Panel, plain, small_multiples, written
 from kinertia.report.figures.time_figures import MOST_FRAMES
 from kinertia.report.pages.cycle_table import stride_rows
 from kinertia.report.pages.file_outputs import outputs_summary, outputs_view
@@ -27,7 +26,7 @@ from kinertia.trial.data import FEET
 
 CHANGED_SD = INTERVAL_SD
 """A difference of more than this many of its own SDs is a change."""
-_COLOURS = style.COMPARED
+_COLOURS = COMPARED
 MOST_FITS = len(_COLOURS)
 _MOST_TRIALS = 3
 """Number of trials of each result whose files' own outputs are shown."""
@@ -272,7 +271,7 @@ def moments_figure(fits: Mapping[str, Fit]) -> Figure | None:
                 and (sign := same_sign(joint, side, first, walked[name].skeleton))
             ]
             if traces:
-                side_word = style.SIDES[side][0].capitalize()
+                side_word = SIDES[side][0].capitalize()
                 panels.append(Panel(f"{side_word} {title[0].lower()}{title[1:]} ({UNITS_OF_CURVES['moment']})", traces))
     if not panels:
         return None

@@ -14,9 +14,19 @@ from scipy.spatial import ConvexHull
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.simultaneous.fit import Posterior
-from kinertia.report.figures import style
 from kinertia.report.figures.bsp_figures import estimated_rows, segment_name
-from kinertia.report.figures.figure import Figure, base_layout, compact, plain
+from kinertia.report.figures.figure import (
+    BLACK,
+    BLUE,
+    GREY,
+    UNUSED,
+    VERMILION,
+    Figure,
+    base_layout,
+    between,
+    compact,
+    plain,
+)
 from kinertia.report.figures.skeleton_view import last_marker
 from kinertia.report.wording import INTERVAL_SD, fixed, start_of
 
@@ -180,7 +190,7 @@ def _segment(outline: np.ndarray, colour: str, text: str) -> dict[str, Any]:
         "y": compact(outline[:, 1]),
         "fill": "toself",
         "fillcolor": colour,
-        "line": {"color": style.GREY, "width": 1},
+        "line": {"color": GREY, "width": 1},
         "hoveron": "fills",
         "hoverinfo": "text",
         "text": text,
@@ -198,7 +208,7 @@ def _centres(fit: Fit, body: _Body, view: _View, rows: list[int], place: float) 
             "mode": "markers",
             "x": compact(_flat(at[rows], view)[:, 0] + place),
             "y": compact(at[rows, 1]),
-            "marker": {"symbol": symbol, "size": 7 if symbol == "circle-open" else 5, "color": style.BLACK},
+            "marker": {"symbol": symbol, "size": 7 if symbol == "circle-open" else 5, "color": BLACK},
             "name": name,
             "legendgroup": name,
             "showlegend": view is _VIEWS[0],
@@ -242,10 +252,10 @@ class _Colours:
     def fill(self, i: int) -> str:
         """Return the colour of segment i."""
         if not np.isfinite(self.values[i]):
-            return style.UNUSED
+            return UNUSED
         low, high = self.limits
         place = 2 * float(np.clip((self.values[i] - low) / (high - low), 0.0, 1.0))
-        return style.between(self.stops[int(place > 1)], self.stops[1 + int(place > 1)], place - int(place > 1))
+        return between(self.stops[int(place > 1)], self.stops[1 + int(place > 1)], place - int(place > 1))
 
     def scale(self) -> dict[str, Any]:
         """Draw the scale below the drawings; plotly draws it for a trace, which shows nothing else."""
@@ -271,7 +281,7 @@ def _by_mass(fit: Fit) -> _Colours:
     return _Colours(
         percent,
         (-reach, reach),
-        (style.BLUE, "#FFFFFF", style.VERMILION),
+        (BLUE, "#FFFFFF", VERMILION),
         f"change of mass against {start_of(fit).of} (%)",
         texts,
         f"The body from the right, the front and the left, coloured by change of mass. {'; '.join(texts)}.",
@@ -289,7 +299,7 @@ def _by_information(fit: Fit, posterior: Posterior) -> _Colours:
     return _Colours(
         percent,
         (0.0, 100.0),
-        ("#FFFFFF", style.between("#FFFFFF", style.BLUE, 0.5), style.BLUE),
+        ("#FFFFFF", between("#FFFFFF", BLUE, 0.5), BLUE),
         "information on the mass (%)",
         texts,
         f"The body from the right, the front and the left, coloured by how much the data inform each mass. "

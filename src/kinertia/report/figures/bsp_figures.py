@@ -8,8 +8,19 @@ import numpy as np
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.simultaneous.fit import Posterior
 from kinertia.model.bsp import BodySegmentParameters
-from kinertia.report.figures import style
-from kinertia.report.figures.figure import Figure, Panel, base_layout, compact, plain, small_multiples
+from kinertia.report.figures.figure import (
+    BLACK,
+    BLUE,
+    PALE,
+    VERMILION,
+    Figure,
+    Panel,
+    base_layout,
+    between,
+    compact,
+    plain,
+    small_multiples,
+)
 from kinertia.report.wording import INTERVAL_SD, decimals, expected_of, fixed, read_in
 
 DEPARTURE_SD = 2.0
@@ -74,7 +85,7 @@ def change_figure(fit: Fit, columns: Sequence[int] = MAIN, truth: BodySegmentPar
         if truth is not None:
             away = (truth.table() - fit.expected.table())[shown, k]
             texts = [f"{plain(segment_name(fit.estimate.segments[i]))}: truth" for i in shown]
-            look = {"symbol": "diamond-open", "size": 10, "color": style.BLACK, "line": {"width": 1.5}}
+            look = {"symbol": "diamond-open", "size": 10, "color": BLACK, "line": {"width": 1.5}}
             traces.append(_dots(away / scale, np.arange(len(shown)), texts) | {"marker": look, "name": "truth"})
         panels.append(Panel(f"{NAMES[k]} ({unit})", traces, (), rows))
     bars = "without error bars" if posterior is None else "with 95 % intervals before and after"
@@ -132,16 +143,16 @@ def _traces(fit: Fit, shown: np.ndarray, k: int, scale: np.ndarray) -> list[dict
             "mode": "markers",
             "x": compact(np.zeros(int(free.sum()))),
             "y": place[free].tolist(),
-            "marker": {"symbol": "square", "size": 7, "color": style.PALE},
-            "error_x": _bars(INTERVAL_SD * prior_sd[free] / scale[free], 7, style.PALE),
+            "marker": {"symbol": "square", "size": 7, "color": PALE},
+            "error_x": _bars(INTERVAL_SD * prior_sd[free] / scale[free], 7, PALE),
             "name": f"{start.word}, 95 %",
             "hoverinfo": "skip",
         }
     ]
     far = np.abs(after - before) > DEPARTURE_SD * prior_sd
     for chosen, name, colour, symbol in (
-        (free & ~far, "estimate, 95 %", style.BLUE, "circle"),
-        (free & far, f"estimate beyond {DEPARTURE_SD:g} prior SDs", style.VERMILION, "diamond"),
+        (free & ~far, "estimate, 95 %", BLUE, "circle"),
+        (free & far, f"estimate beyond {DEPARTURE_SD:g} prior SDs", VERMILION, "diamond"),
     ):
         if chosen.any():
             dots = _dots(away[chosen], place[chosen], [line for line, yes in zip(texts, chosen, strict=True) if yes])
@@ -156,7 +167,7 @@ def _dots(x: np.ndarray, place: np.ndarray, texts: list[str]) -> dict[str, Any]:
         "mode": "markers",
         "x": compact(x),
         "y": place.tolist(),
-        "marker": {"size": 8, "color": style.BLUE},
+        "marker": {"size": 8, "color": BLUE},
         "text": texts,
         "hovertemplate": "%{text}<extra></extra>",
     }
@@ -202,7 +213,7 @@ def information_figure(fit: Fit) -> Figure | None:
         "width": 1,
         # colours in place of numbers on a scale: of each number plotly.js warns where it chooses the letters
         "marker": {
-            "color": [style.between("#FFFFFF", style.BLUE, value / 100) for value in values],
+            "color": [between("#FFFFFF", BLUE, value / 100) for value in values],
             "line": {"color": "#FFFFFF", "width": 2},
         },
         "text": [f"{value:.0f}" for value in values],

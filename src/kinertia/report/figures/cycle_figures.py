@@ -21,7 +21,6 @@ from kinertia.model.skeleton import Skeleton, by_side, opposite_on_left
 from kinertia.motion.gait_cycle import PERCENT, Phase
 from kinertia.motion.joint_moments import body_joints, component_names, joint_and_side
 from kinertia.motion.model_outputs import CLINICAL_ANGLES
-from kinertia.report.figures import style
 from kinertia.report.figures.coordinate_titles import (
     convention_of,
     load_title,
@@ -30,7 +29,7 @@ from kinertia.report.figures.coordinate_titles import (
     signed_angles,
     signed_joint_moment,
 )
-from kinertia.report.figures.figure import Figure, Panel, compact, plain, shaded, small_multiples
+from kinertia.report.figures.figure import GREY, SIDES, Figure, Panel, compact, faded, plain, shaded, small_multiples
 from kinertia.report.wording import INTERVAL_SD, USUAL, start_of
 from kinertia.settings import SignConvention
 from kinertia.trial.data import FEET
@@ -213,7 +212,7 @@ class _Drawn:
         for side in FEET:
             both = (each.get((quantity, side), []) for each in (self.estimate, self.usual))
             curves, usual = ([replace(one, value=sign * one.value) for one in some] for some in both)
-            word, colour = style.SIDES[side]
+            word, colour = SIDES[side]
             if curves:
                 yield from _estimate(curves, word, colour)
             if usual and quantity not in CLINICAL_ANGLES:  # which no estimate changes
@@ -230,7 +229,7 @@ class _Drawn:
         shapes = []
         for side in FEET:
             if curves := self.estimate.get((quantity, side)):
-                colour = style.faded(style.SIDES[side][1], _GAP_OPACITY)
+                colour = faded(SIDES[side][1], _GAP_OPACITY)
                 unknown = runs(~np.isfinite(mean_curve(curves)))
                 shapes += [shaded(max(a - 1.0, 0.0), min(b + 1.0, 100.0), colour) for a, b in unknown]
         return shapes
@@ -243,7 +242,7 @@ class _Drawn:
             percents = [p for stride in strides if np.isfinite(p := stride.percent(stride.toe_off_s))]
             if percents:
                 at = round(float(np.mean(percents)), 2)
-                line = {"color": style.faded(style.SIDES[side][1], 0.6), "width": 1, "dash": "dash"}
+                line = {"color": faded(SIDES[side][1], 0.6), "width": 1, "dash": "dash"}
                 shapes.append({"type": "line", "x0": at, "x1": at, "y0": 0, "y1": 1, "yref": "domain", "line": line})
         return shapes
 
@@ -267,17 +266,15 @@ def _norm(norm: Norm, opposite: bool) -> Iterator[dict[str, Any]]:
     """Draw a grey band; for `kinertia norms` with opposite signs one per side in its colour, mirrored on the left."""
     low, high = norm.mean - norm.sd, norm.mean + norm.sd
     if not (opposite and norm.convention):
-        yield {**_outline(norm.percent, low, high, style.faded(style.GREY, 0.3)), "name": "norm, mean ± SD"}
+        yield {**_outline(norm.percent, low, high, faded(GREY, 0.3)), "name": "norm, mean ± SD"}
         return
-    for (word, colour), (bottom, top) in zip(
-        (style.SIDES[side] for side in FEET), ((low, high), (-high, -low)), strict=True
-    ):
-        yield {**_outline(norm.percent, bottom, top, style.faded(colour, _SD_OPACITY)), "name": f"norm, {word}"}
+    for (word, colour), (bottom, top) in zip((SIDES[side] for side in FEET), ((low, high), (-high, -low)), strict=True):
+        yield {**_outline(norm.percent, bottom, top, faded(colour, _SD_OPACITY)), "name": f"norm, {word}"}
 
 
 def has_spread(figure: Figure) -> bool:
     """Return whether strides overlap anywhere, so that there are means and SDs."""
-    ends = tuple(f"{style.SIDES[side][0]}, mean" for side in FEET)
+    ends = tuple(f"{SIDES[side][0]}, mean" for side in FEET)
     return any(trace["name"].startswith(ends) for trace in figure.data)
 
 
@@ -295,17 +292,17 @@ def _estimate(curves: Sequence[CycleCurve], word: str, colour: str) -> Iterator[
     mean, spread = mean_of(values[common]), _spread(values[common])
     if spread is not None:
         yield {
-            **band(mean - spread, mean + spread, style.faded(colour, _SD_OPACITY)),
+            **band(mean - spread, mean + spread, faded(colour, _SD_OPACITY)),
             "name": f"{word}, mean ± SD",
             **quiet,
         }
     half = INTERVAL_SD * mean_of(np.array([one.sd for one in curves])[common])
     if np.isfinite(half).any():
         name = f"{word}, 95 % of the estimate"
-        yield {**band(mean - half, mean + half, style.faded(colour, _BAND_OPACITY)), "name": name, **quiet}
+        yield {**band(mean - half, mean + half, faded(colour, _BAND_OPACITY)), "name": name, **quiet}
     if len(curves) > 1:
         shown = [curves[k] for k in np.unique(np.linspace(0, len(curves) - 1, _MOST_DRAWN).round().astype(int))]
-        line = {"color": style.faded(colour, _STRIDE_OPACITY), "width": 0.8}
+        line = {"color": faded(colour, _STRIDE_OPACITY), "width": 0.8}
         yield {**_strides(shown), "name": f"{word}, {curves[0].stride.phase}s", "line": line, **quiet}
     phase = curves[0].stride.phase
     name = "mean" if spread is not None else f"one {phase}" if len(curves) < 2 else f"longest {phase}"
@@ -348,7 +345,7 @@ def _strides(curves: Sequence[CycleCurve]) -> dict[str, Any]:
     """Draw all strides as one line with gaps between them."""
     x = np.tile(np.append(PERCENT, 100), len(curves)).astype(np.uint8)
     y = np.concatenate([np.append(one.value, np.nan) for one in curves])
-    titles = [f"{plain(one.trial)}, {style.SIDES[one.stride.side][0]} stride {one.stride.number}" for one in curves]
+    titles = [f"{plain(one.trial)}, {SIDES[one.stride.side][0]} stride {one.stride.number}" for one in curves]
     hover = "%{x:.0f} %: %{y:.3g}<extra>" + (titles[0] if len(titles) == 1 else "%{fullData.name}") + "</extra>"
     return {"type": "scatter", "mode": "lines", "x": x, "y": compact(y), "hovertemplate": hover}
 

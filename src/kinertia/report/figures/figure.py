@@ -1,4 +1,4 @@
-"""Defines a figure as plain data, and how its panels and rows are laid out.
+"""Defines a figure as plain data: its colours and lines, and how panels and rows are laid out.
 
 Reports do not load plotly for this: its objects check every value against a schema, which took a fifth of a fit's time;
 here the tests check every figure once.
@@ -27,8 +27,23 @@ import numpy as np
 from kinertia.errors import FileError
 from kinertia.io.output_folder import write_then_rename
 from kinertia.model.compiled import cache_folder
-from kinertia.report.figures import style
 
+BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION = "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00"
+GREY, PALE, UNUSED = "#6B6B6B", "#C8C8C8", "#E9E9E9"
+SIDES = {"r": ("right", BLUE), "l": ("left", VERMILION), "": ("", BLACK)}
+"""Word and colour by the suffix of a coordinate's name; "" where it has no side."""
+COMPARED = (BLACK, ORANGE, "#CC79A7", SKY, GREY, GREEN)
+"""Colours of results that are compared: none is a side's."""
+SIDE_COLOURS = {"r": (BLUE, "blue"), "l": (VERMILION, "vermilion")}
+"""Colour of each side, and its name."""
+STAGES = {
+    "literature": {"color": GREY, "dash": "dot", "width": 1.5},
+    "corrected": {"color": ORANGE, "dash": "dash", "width": 1.5},
+    "estimate_full": {"color": SKY, "dash": "solid", "width": 1},
+    "estimate": {"color": BLUE, "dash": "solid", "width": 2},
+}
+"""Line of each stage of the residuals."""
+FONT = "system-ui, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
 _BEST = 9
 _BOTTOM_PX, _RIGHT_PX = 44, 14
 _LEGEND_ROW_PX, _LEGEND_PER_ROW = 27, {1: 1, 2: 2, 3: 4}
@@ -38,19 +53,31 @@ _PAPER_PX = 620
 """Rows of panels on a sheet of paper, below the table of strides, at the scale of the page's print style."""
 _AXIS = {
     "zeroline": True,
-    "zerolinecolor": style.PALE,
+    "zerolinecolor": PALE,
     "zerolinewidth": 1,
     "gridcolor": "#EFEFEF",
-    "linecolor": style.GREY,
+    "linecolor": GREY,
     "ticks": "outside",
     "ticklen": 3,
     "tickfont": {"size": 11},
     "automargin": False,
 }
-_COLOURS = (style.GREY, style.BLUE, style.ORANGE, style.GREEN)
-_BARS = (style.BLUE, style.SKY, style.PALE, style.VERMILION)
+_COLOURS = (GREY, BLUE, ORANGE, GREEN)
+_BARS = (BLUE, SKY, PALE, VERMILION)
 _SYMBOLS = ("circle-open", "circle", "diamond", "square")
 _ROW_PX, _LEFT_PX, _LETTERS = 34, 150, 22
+
+
+def faded(colour: str, opacity: float) -> str:
+    """Convert the colour "#rrggbb" to "rgba(...)"."""
+    red, green, blue = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
+    return f"rgba({red},{green},{blue},{opacity:g})"
+
+
+def between(first: str, second: str, share: float) -> str:
+    """Return the colour at this share (0 to 1) of the way from one "#rrggbb" to another."""
+    parts = [[int(colour[k : k + 2], 16) for k in (1, 3, 5)] for colour in (first, second)]
+    return "#" + "".join(f"{round(a + share * (b - a)):02X}" for a, b in zip(*parts, strict=True))
 
 
 @dataclass(frozen=True)
@@ -214,7 +241,7 @@ def base_layout(alt: str) -> dict[str, Any]:
     """Return the common layout of figures: font, white ground, legend on top, text `alt`, and no notebook template."""
     return {
         "template": {},
-        "font": {"family": style.FONT, "size": 12, "color": "#1A1A1A"},
+        "font": {"family": FONT, "size": 12, "color": "#1A1A1A"},
         "paper_bgcolor": "#FFFFFF",
         "plot_bgcolor": "#FFFFFF",
         "margin": {"t": _TITLE_PX, "b": _BOTTOM_PX, "l": 52, "r": _RIGHT_PX},

@@ -6,8 +6,7 @@ import numpy as np
 
 from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.model.marker_set import MarkerSet
-from kinertia.report.figures import style
-from kinertia.report.figures.figure import Figure, base_layout, compact, plain
+from kinertia.report.figures.figure import BLUE, ORANGE, SKY, VERMILION, Figure, base_layout, compact, plain
 from kinertia.report.figures.skeleton_view import Scene, plate_corners
 from kinertia.trial.data import Markers, Recording
 from kinertia.trial.sampled_data import rms_by_marker, runs
@@ -51,8 +50,8 @@ def marker_figure(trial: TrialFit, drifting: tuple[str, ...] = ()) -> Figure:
             "hovertemplate": "%{y}: %{x:.1f} mm<extra>%{fullData.name}</extra>",
         }
         for stage, name, symbol, colour in (
-            ("ik", "inverse kinematics", "circle-open", style.ORANGE),
-            ("final", "estimate", "circle", style.BLUE),
+            ("ik", "inverse kinematics", "circle-open", ORANGE),
+            ("final", "estimate", "circle", BLUE),
         )
     ]
     worst = order[0]
@@ -90,7 +89,7 @@ def gap_figure(markers: Markers, windows_s: Sequence[tuple[float, float]], name:
         for first, last in runs(hidden[:, k]):
             x += [round(float(time[first]) - half, 4), round(float(time[last]) + half, 4), None]
             y += [label, label, None]
-    line = {"type": "scatter", "mode": "lines", "x": x, "y": y, "line": {"width": 9, "color": style.VERMILION}}
+    line = {"type": "scatter", "mode": "lines", "x": x, "y": y, "line": {"width": 9, "color": VERMILION}}
     alt = f"Times at which markers of {name} were not seen: gaps in {len(gappy)} of {hidden.shape[1]} markers."
     layout = base_layout(alt)
     over = {"type": "rect", "xref": "x", "yref": "y domain", "y0": 0, "y1": 1, "line": {"width": 0}, "layer": "below"}
@@ -100,7 +99,7 @@ def gap_figure(markers: Markers, windows_s: Sequence[tuple[float, float]], name:
         "margin": {"t": 12, "b": 44, "l": 12, "r": 14},
         "xaxis": {"title": {"text": "time (s)"}, "range": [float(time[0]), float(time[-1])], "gridcolor": "#EFEFEF"},
         "yaxis": {**_LABELS, "range": [len(names) - 0.3, -0.7]},
-        "shapes": [{**one, "fillcolor": style.SKY, "opacity": 0.18} for one in blue],
+        "shapes": [{**one, "fillcolor": SKY, "opacity": 0.18} for one in blue],
         "showlegend": False,
     }
     return Figure([{**line, "hovertemplate": "%{y}, %{x:.3f} s<extra></extra>"}], layout)

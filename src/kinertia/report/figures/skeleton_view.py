@@ -17,9 +17,8 @@ from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import Kinematics
-from kinertia.report.figures import style
 from kinertia.report.figures.bsp_figures import segment_name
-from kinertia.report.figures.figure import Figure, base_layout, compact, plain
+from kinertia.report.figures.figure import BLACK, GREEN, ORANGE, SIDES, SKY, Figure, base_layout, compact, plain
 from kinertia.trial.data import LOAD_THRESHOLD_N
 from kinertia.trial.ground_contact import centre_of_pressure
 
@@ -104,7 +103,7 @@ def packed(shown: Scene) -> dict[str, Any]:
     parts = {name: values.reshape(len(shown.time), -1, 3) - place for name, values in moving.items() if values.size}
     parts["plates"] = shown.plates.reshape(1, -1, 3) - place
     parts["ellipsoids"] = shown.ellipsoids.reshape(len(shown.time), -1, 3)
-    colours = {side: colour for side, (_, colour) in style.SIDES.items()}
+    colours = {side: colour for side, (_, colour) in SIDES.items()}
     return {
         "time": [round(float(t), 4) for t in shown.time],
         "bones": shown.bones.tolist(),
@@ -269,15 +268,15 @@ def _traces(shown: Scene, bsp: BodySegmentParameters, k: int) -> list[dict[str, 
     arrows[:, :2] = shown.arrows[k]
     radius = 300 * _BALL_M_PER_KG * np.cbrt(np.maximum(bsp.mass_kg, 0.0))
     names = [f"{segment_name(name)}: {mass:.2f} kg" for name, mass in zip(bsp.segments, bsp.mass_kg, strict=True)]
-    balls = {"size": radius.tolist(), "color": style.ORANGE, "opacity": 0.75, "line": {"width": 0}}
+    balls = {"size": radius.tolist(), "color": ORANGE, "opacity": 0.75, "line": {"width": 0}}
     return [
         *(
             _trace(lines[sides == side], word or "trunk", mode="lines", line={"color": colour, "width": 5})
-            for side, (word, colour) in style.SIDES.items()
+            for side, (word, colour) in SIDES.items()
         ),
-        _trace(arrows, "ground reaction", mode="lines", line={"color": style.GREEN, "width": 6}),
-        _trace(shown.modelled[k], "markers, model", mode="markers", marker={"size": 3, "color": style.SKY}),
-        _trace(shown.measured[k], "markers, measured", mode="markers", marker={"size": 3, "color": style.BLACK}),
+        _trace(arrows, "ground reaction", mode="lines", line={"color": GREEN, "width": 6}),
+        _trace(shown.modelled[k], "markers, model", mode="markers", marker={"size": 3, "color": SKY}),
+        _trace(shown.measured[k], "markers, measured", mode="markers", marker={"size": 3, "color": BLACK}),
         _trace(
             shown.com[k],
             "centres of mass",

@@ -16,9 +16,19 @@ from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.joint_moments import component_names, joint_and_side
 from kinertia.motion.kinematics import Kinematics
-from kinertia.report.figures import style
 from kinertia.report.figures.coordinate_titles import Coordinate, load_title, panels_of, signed_joint_moment
-from kinertia.report.figures.figure import Figure, Panel, compact, shaded, small_multiples
+from kinertia.report.figures.figure import (
+    BLACK,
+    SIDES,
+    STAGES,
+    UNUSED,
+    Figure,
+    Panel,
+    compact,
+    faded,
+    shaded,
+    small_multiples,
+)
 from kinertia.report.wording import INTERVAL_SD, LITERATURE, Start
 from kinertia.settings import SignConvention
 from kinertia.trial.file_contents import GaitEvent
@@ -45,12 +55,12 @@ def residual_figure(trial: TrialFit, most_frames: int = MOST_FRAMES, start: Star
     thin, axis = thinned(len(trial.time), most_frames), time_axis(trial.kinematics)
     marks = [*_unused(trial.kinematics, axis), *event_lines(shown_events(trial.kinematics))]
     stages = {
-        stage_name(stage, start, _hz(trial, stage)): (style.STAGES[stage], values)
+        stage_name(stage, start, _hz(trial, stage)): (STAGES[stage], values)
         for stage, values in trial.residuals.items()
     }
     full = f"estimate, {full_bandwidth(trial.reactions)}"
     # the first is drawn below the others
-    stages = {full: (style.STAGES["estimate_full"], trial.full_residuals["estimate"]), **stages}
+    stages = {full: (STAGES["estimate_full"], trial.full_residuals["estimate"]), **stages}
     panels = []
     for k in range(6):
         kind = "Force" if k < 3 else "Moment"
@@ -149,11 +159,11 @@ def bands(one: Coordinate, time: np.ndarray, values: np.ndarray, sd: np.ndarray,
     """Draw a 95 % band around values (w, c) per side: an invisible lower edge, and an upper one filled down to it."""
     traces, thin = [], slice(None, None, BAND_EVERY * thin.step)
     for side, column in one.columns.items():
-        word, colour = style.SIDES[side]
+        word, colour = SIDES[side]
         middle, half = values[:, column], INTERVAL_SD * sd[:, column]
         edge = {"line": {"width": 0}, "hoverinfo": "skip", "hovertemplate": None}
         name = f"{word} 95 % band".strip()
-        fill = {"fill": "tonexty", "fillcolor": style.faded(colour, 0.18), "name": name, "showlegend": False}
+        fill = {"fill": "tonexty", "fillcolor": faded(colour, 0.18), "name": name, "showlegend": False}
         lower = {"name": f"{name}, lower edge", "showlegend": False}
         traces.append({**_curve(time, middle - half, thin), **edge, **lower})
         traces.append({**_curve(time, middle + half, thin), **edge, **fill})
@@ -167,8 +177,8 @@ def lines_by_side(
     return [
         {
             **_curve(time, values[:, column], thin),
-            "name": ", ".join(filter(None, (style.SIDES[side][0], name))),
-            "line": {"color": style.SIDES[side][1], **line},
+            "name": ", ".join(filter(None, (SIDES[side][0], name))),
+            "line": {"color": SIDES[side][1], **line},
             "showlegend": bool(side),
         }
         for side, column in one.columns.items()
@@ -212,7 +222,7 @@ def _unused(kinematics: Kinematics, axis: dict[str, Any]) -> list[dict[str, Any]
     """Shade times outside the windows."""
     starts, ends = zip(*kinematics.windows_s, strict=True)
     spans = zip((axis["range"][0], *ends), (*starts, axis["range"][1]), strict=True)
-    return [shaded(first, last, style.UNUSED) for first, last in spans if last - first > 1e-6]
+    return [shaded(first, last, UNUSED) for first, last in spans if last - first > 1e-6]
 
 
 def shown_events(kinematics: Kinematics, axis: Mapping[str, Any] | None = None) -> list[GaitEvent]:
@@ -230,7 +240,7 @@ def event_lines(events: Sequence[GaitEvent], one: Coordinate | None = None) -> l
 
 def _vertical_line(event: GaitEvent) -> dict[str, Any]:
     dash = "solid" if event.kind == "heel strike" else "dash"
-    line = {"color": style.faded(style.SIDES[event.side][1], 0.6), "width": 1, "dash": dash}
+    line = {"color": faded(SIDES[event.side][1], 0.6), "width": 1, "dash": dash}
     return {"type": "line", "x0": event.time_s, "x1": event.time_s, "y0": 0, "y1": 1, "yref": "domain", "line": line}
 
 
@@ -257,7 +267,7 @@ class _Loads:
         first, last = axis["range"]
         result = []
         for side, column in one.columns.items():
-            colour = style.UNUSED if side not in style.SIDES or not side else style.faded(style.SIDES[side][1], _FAINT)
+            colour = UNUSED if side not in SIDES or not side else faded(SIDES[side][1], _FAINT)
             known = np.isfinite(self.stages["estimate"][:, column])
             ends = [first, *(t for a, b in runs(known) for t in (self.time[a], self.time[b])), last]
             gaps = zip(ends[::2], ends[1::2], strict=True)
@@ -290,7 +300,7 @@ def moment_figure(
             values = loads.stages[stage] / mass_kg
             traces += lines_by_side(one, stage_name(stage, start), loads.time, values, thin, line)
         if truth is not None:
-            dashed = {"color": style.BLACK, "dash": "dash", "width": 1.4}
+            dashed = {"color": BLACK, "dash": "dash", "width": 1.4}
             own = thinned(len(trial.time), most_frames)
             traces += [
                 {**curve, "name": "truth"}

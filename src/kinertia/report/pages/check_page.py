@@ -11,8 +11,21 @@ from kinertia.diagnostics.plates.ground_contact import Contact
 from kinertia.findings.finding import Finding
 from kinertia.findings.overview import Overview, reported
 from kinertia.io.output_folder import complete_folder
-from kinertia.report.figures import style
-from kinertia.report.figures.figure import Figure, Panel, base_layout, compact, plain, small_multiples, written
+from kinertia.report.figures.figure import (
+    BLACK,
+    GREEN,
+    GREY,
+    ORANGE,
+    SIDES,
+    UNUSED,
+    Figure,
+    Panel,
+    base_layout,
+    compact,
+    plain,
+    small_multiples,
+    written,
+)
 from kinertia.report.figures.marker_figures import gap_figure, marker_scene
 from kinertia.report.figures.skeleton_view import view
 from kinertia.report.pages.finding_view import FindingView
@@ -31,11 +44,11 @@ MOST_SAMPLES = 1200
 MOST_CONTACTS = 24
 """Whose centres of pressure are drawn: more would hide each other."""
 _COMPONENTS = (
-    ("upward", 1, {"color": style.BLACK, "width": 2}),
-    ("along X", 0, {"color": style.ORANGE, "width": 1.3}),
-    ("along Z", 2, {"color": style.GREEN, "width": 1.3}),
+    ("upward", 1, {"color": BLACK, "width": 2}),
+    ("along X", 0, {"color": ORANGE, "width": 1.3}),
+    ("along Z", 2, {"color": GREEN, "width": 1.3}),
 )
-_FEET = {"r": style.SIDES["r"], "l": style.SIDES["l"], None: ("unknown foot", style.GREY)}
+_FEET = {"r": SIDES["r"], "l": SIDES["l"], None: ("unknown foot", GREY)}
 _WIDTHS_PX = {"1": 360, "2": 700, "3": 1000, "print": 960}
 """Widths of the page, by the number of columns of panels that fit."""
 _LEAST_PX, _MOST_PX = 150, 460
@@ -184,7 +197,7 @@ def _unmeasured(check: RecordingCheck, start: float, end: float) -> list[dict[st
     if check.used_set is None or check.travel.kind == "stands still":
         return []
     edges = [start, *(t for window in sorted(check.windows) for t in window), end]
-    return [_ground(a, b, style.UNUSED, 1.0) for a, b in zip(edges[::2], edges[1::2], strict=True) if b > a]
+    return [_ground(a, b, UNUSED, 1.0) for a, b in zip(edges[::2], edges[1::2], strict=True) if b > a]
 
 
 def _contact(contact: Contact) -> dict[str, Any]:
@@ -262,7 +275,7 @@ def _from_above(traces: Sequence[dict[str, Any]], alt: str) -> Figure:
 def _plate(plates: PlateLoads, p: int) -> dict[str, Any]:
     assert plates.corners is not None
     ring = plates.corners[p][[0, 1, 2, 3, 0]]
-    look = {"mode": "lines", "line": {"color": style.GREY, "width": 1.5}, "fill": "toself", "fillcolor": "#F3F3F3"}
+    look = {"mode": "lines", "line": {"color": GREY, "width": 1.5}, "fill": "toself", "fillcolor": "#F3F3F3"}
     return {
         "X": ring[:, 0],
         "Z": ring[:, 2],

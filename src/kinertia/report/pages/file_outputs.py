@@ -9,9 +9,8 @@ import numpy as np
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.motion.model_outputs import ModelOutput, model_outputs
-from kinertia.report.figures import style
 from kinertia.report.figures.coordinate_titles import Coordinate
-from kinertia.report.figures.figure import Figure, small_multiples, written
+from kinertia.report.figures.figure import SIDES, Figure, small_multiples, written
 from kinertia.report.figures.time_figures import MOST_FRAMES, panel_over_time, time_axis
 from kinertia.report.wording import INTERVAL_SD
 from kinertia.trial.file_contents import FileOutputs
@@ -181,7 +180,7 @@ def _row(one: OutputComparison) -> dict[str, Any]:
     outside = one.outside
     return {
         "quantity": f"{one.quantity} ({one.unit})",
-        "side": style.SIDES[one.side][0],
+        "side": SIDES[one.side][0],
         "rms": f"{one.rms:.{digits}f}",
         "mean": f"{one.mean:+.{digits}f}",
         "correlation": f"{one.correlation:.2f}",

@@ -21,7 +21,6 @@ from kinertia.io.subject.provenance import Provenance
 from kinertia.io.versions import versions
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
 from kinertia.motion.model_outputs import CLINICAL_ANGLES
-from kinertia.report.figures import style
 from kinertia.report.figures.body_figure import body_figure
 from kinertia.report.figures.bsp_figures import (
     MAIN,
@@ -44,7 +43,7 @@ from kinertia.report.figures.cycle_figures import (
     has_spread,
     phase_figures,
 )
-from kinertia.report.figures.figure import Figure, base_layout, written
+from kinertia.report.figures.figure import SIDE_COLOURS, SIDES, Figure, base_layout, written
 from kinertia.report.figures.marker_figures import fit_gap_figure, marker_figure
 from kinertia.report.figures.skeleton_view import scene, view
 from kinertia.report.figures.time_figures import (
@@ -119,7 +118,7 @@ def render(
         phases=[_phase(one) for one in phase_figures(fit, curves, legs=True)],
         convention=convention_of(fit),
         about=_about(fit, provenance),
-        sides={side: name for side, (_, name) in style.SIDE_COLOURS.items()},
+        sides={side: name for side, (_, name) in SIDE_COLOURS.items()},
         covered=covered,
         gaps=gaps if "%" in covered else "",
         all_gaps=gaps,
@@ -366,7 +365,7 @@ def map_figure(view: ProfileView) -> Figure:
             "x": [_number(getattr(row, side)) for row in view.rows],
             "y": list(range(len(view.rows))),
             "name": side,
-            "marker": {"color": style.SIDES[side[0]][1]},
+            "marker": {"color": SIDES[side[0]][1]},
             "hovertemplate": "%{x:.1f} degrees<extra>%{fullData.name}</extra>",
         }
         for side in ("right", "left")

@@ -23,7 +23,7 @@ from kinertia.estimation.simultaneous.instruments.instrument_errors import DELAY
 from kinertia.motion.ground_reactions import measured_reactions
 from kinertia.motion.joint_moments import BodyJoint, component_signs, joint_wrenches, leg_joints
 from kinertia.motion.smoothing import smooth
-from kinertia.report.figures import style
+from kinertia.report.figures.figure import SIDES
 from kinertia.report.pages.file_outputs import moment_divisor
 from kinertia.report.wording import INTERVAL_SD
 from kinertia.trial.data import FEET
@@ -322,7 +322,7 @@ def _causes(sides: Sequence[CurveDifference]) -> str:
     texts = []
     for cause in dict.fromkeys(one.cause for one in beyond):
         own = [one for one in beyond if one.cause == cause]
-        whose = "" if len(own) == len(sides) else f"{style.SIDES[own[0].side][0]}: "
+        whose = "" if len(own) == len(sides) else f"{SIDES[own[0].side][0]}: "
         texts.append(whose + _cause(cause, own))
     return "; ".join(texts) or "within the error bars"
 
