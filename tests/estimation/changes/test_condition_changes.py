@@ -190,3 +190,8 @@ def test_the_command_compares_conditions_of_a_result(twice, fit, tmp_path):
     assert "stated are: barefoot, with shoes" in refused.err
     with pytest.raises(KinertiaError):
         compare(fit, conditions=("barefoot", "with shoes"))
+
+
+def test_a_condition_is_not_compared_with_itself(fit):
+    with pytest.raises(KinertiaError, match="choose two"):
+        condition_changes.condition_features(fit, "", "")

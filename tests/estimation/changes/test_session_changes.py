@@ -122,6 +122,23 @@ def test_a_changed_knee_is_found(sessions):
     assert {one.verdict for one in other} == {"not shown"}
 
 
+def test_results_of_one_session_alone_are_pointed_out(sessions):
+    draws = sessions[0].posterior.draws
+    wide = np.random.default_rng(0).normal(0.0, 0.01, draws.places.shape)
+    for places, narrow in ((draws.places, True), (wide, False)):
+        fits = [
+            replace(one, posterior=replace(one.posterior, draws=replace(one.posterior.draws, places=places)))
+            for one in sessions
+        ]
+        assert session(fits[0]).narrow_markers is narrow
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(module, "DRAWS", 2)
+            found = compare(*fits)
+        assert bool(found.note) is narrow
+        assert (found.sentences[-1] == found.note) is narrow
+        assert found.summary["note"] == found.note
+
+
 def test_both_are_evaluated_with_one_body(sessions):
     """Estimates of the body that differ by chance are no change of moments."""
     before, after = sessions

@@ -76,8 +76,10 @@ def condition_features(
         progress: is told the share done.
 
     Raises:
-        KinertiaError: no trial states one of the conditions, or the fit has no posterior draws.
+        KinertiaError: no trial states one of the conditions, both are the same, or the fit has no posterior draws.
     """
+    if before == after:
+        raise KinertiaError(f"both conditions are {before!r}; choose two")
     known = conditions_of(fit)
     for wanted in (before, after):
         if wanted not in known:

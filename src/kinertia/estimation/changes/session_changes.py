@@ -38,6 +38,8 @@ _FIXED_AXES = 1.6
 """Factor on deviations due to markers: with fixed axes they covered 78 to 83 % of synthetic sessions, where 4 degrees
 were their axes' error."""
 _BY_AXES = ("moment ankle", "moment subtalar", "angle hip_rotation", "angle knee", "angle ankle", "angle subtalar")
+NARROW_M = 0.006
+"""Largest SD of a marker's position in a fit of one session alone, with a prior of 5 mm; as one of two it has 10 mm."""
 _LIGHTER = 0.1
 """Relative difference of mass beyond which results are hardly of one person."""
 
@@ -60,6 +62,11 @@ class Session:
     def fixed_axes(self) -> bool:
         """Whether axes of knees and ankles were no unknowns of the estimate."""
         return not set(AXIS_TILTS) & set(kept_draws(self.fit).coordinates)
+
+    @property
+    def narrow_markers(self) -> bool:
+        """Whether markers were taken to be where the session's static trial has them, within NARROW_M."""
+        return bool(kept_draws(self.fit).places.std(axis=0).max(initial=0.0) < NARROW_M)
 
 
 def session(fit: Fit, condition: str | None = None) -> Session:

@@ -56,6 +56,10 @@ _LEFT_OUT = frozenset({"P271", "P272", "P276", "P278", "P279", "P280", "P281", "
 """Codes of loads that are not known: moments have gaps there."""
 _MILD = frozenset({"P105", "P106", "P107", "P108"})
 """Codes of noise and resolution, which joint moments of whole phases hardly show."""
+_NARROW = (
+    "A result takes its markers as placed within 5 mm: between days, angles differ by more than its intervals allow. "
+    "Give the subject files instead."
+)
 Trials = Sequence[TrialFit]
 MARKER_SD_M = 0.010
 """Of marker positions in their segments: 5 mm each, and 5 mm that markers of a segment share. As independent errors, 10
@@ -74,6 +78,7 @@ class Comparison:
         gait: cadence, stride length, share of stance and step width, where they are known; gait profile with norms.
         curves: joint moments and angles over the gait cycle, or over stance.
         doubt: findings about instruments that keep changes of moments from being judged.
+        note: what else limits the comparison; empty if nothing does.
 
     Examples:
         >>> found = kinertia.compare("before/subject.toml", "after/subject.toml")  # doctest: +SKIP
@@ -87,12 +92,13 @@ class Comparison:
     gait: tuple[Change, ...] = ()
     curves: tuple[CurveChange, ...] = ()
     doubt: str = ""
+    note: str = ""
 
     @property
     def sentences(self) -> tuple[str, ...]:
         """Walking speed, each outcome that was named beforehand, how many of the others changed, and limits."""
         said = (speed_sentence(self.speed), *change_sentences(self.outcomes), changed_sentence(self.outcomes))
-        return (*said, *limit_sentences(self.outcomes, self.doubt))
+        return (*said, *limit_sentences(self.outcomes, self.doubt), *filter(None, (self.note,)))
 
     @property
     def steps(self) -> tuple[Change, ...]:
@@ -118,7 +124,8 @@ class Comparison:
     @property
     def summary(self) -> dict[str, Any]:
         """What `kinertia compare --json` prints of it."""
-        return {**changes_summary(self.before, self.after, self.outcomes, self.speed, self.gait), "doubt": self.doubt}
+        found = changes_summary(self.before, self.after, self.outcomes, self.speed, self.gait)
+        return {**found, "doubt": self.doubt, "note": self.note}
 
 
 @dataclass(frozen=True)
@@ -195,7 +202,8 @@ def compare(
         rows, later = session_features(first, other, share_done)
         outcomes = changes_between(rows.events, later.events, first.fixed_axes or other.fixed_axes)
         curves = curve_changes(rows.curves, later.curves, apart)
-        return _comparison(conditions or ("before", "after"), first, other, outcomes, curves, norms)
+        note = _NARROW if first.narrow_markers or other.narrow_markers else ""
+        return replace(_comparison(conditions or ("before", "after"), first, other, outcomes, curves, norms), note=note)
     if conditions is None:
         raise KinertiaError("give two sessions, or two conditions of one")
     if isinstance(before, Fit) or Path(before).is_dir():
