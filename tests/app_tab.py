@@ -7,6 +7,7 @@ from urllib.parse import urlsplit
 from chromium import DESKTOP, PATIENCE_MS, playwright
 from found import FAULTY
 from kinertia.findings.overview import Overview
+from kinertia.io.output_folder import complete_folder
 from kinertia.io.subject.provenance import sha256
 from kinertia.report.pages.finding_view import digest
 
@@ -85,7 +86,7 @@ class Tab:
         return self
 
     def checked(self):
-        playwright.expect(self.page.locator("section[aria-labelledby=check] .headline")).to_be_visible()
+        playwright.expect(self.page.locator(".outlook .headline")).to_be_visible()
         playwright.expect(self.page.locator("[data-progress]")).to_have_count(0)
         return self
 
@@ -95,10 +96,12 @@ class Tab:
 
     def verdict(self):
         """The headline on the page, which the report inside it has as well."""
-        headline = self.page.locator("section[aria-labelledby=results] > .headline")
+        playwright.expect(self.page.get_by_role("link", name="Letter, to print")).to_be_visible()
+        headline = self.page.locator(".headline")
         playwright.expect(headline).to_be_visible()
         report = self.page.frame_locator("iframe.report").locator("#verdict .headline, .headline").first
         playwright.expect(report).to_have_text(headline.inner_text())
+        playwright.expect(report).to_be_hidden()
         return headline.inner_text()
 
     def person(self):
@@ -133,10 +136,10 @@ def ready(library, name, lab):
 def with_everything(library, name, lab):
     """Somebody ready who has findings and results, too, without computing any."""
     person = ready(library, name, lab)
-    person.check.mkdir()
     overview = Overview(FAULTY, 61, 2, ("walk 2",))
-    outcome = {"inputs": "", **digest(overview)}
-    (person.check / "outcome.json").write_text(json.dumps(outcome))
+    outcome = {"inputs": "", **digest(overview, {})}
+    with complete_folder(person.check, "app") as work:
+        (work / "outcome.json").write_text(json.dumps(outcome))
     person.results.mkdir()
     (person.results / "fit.json").write_text("{}")
     page = "<!doctype html><html lang=en><title>report</title><main><h1>report</h1></main>"

@@ -161,7 +161,9 @@ def weighed(*masses_kg):
         )
         for k, kg in enumerate(masses_kg)
     ]
-    return SimpleNamespace(total_mass=STATED, trials=trials, standing=[], subject=SimpleNamespace(), static=None)
+    return SimpleNamespace(
+        total_mass=STATED, trials=trials, standing=[], subject=SimpleNamespace(mass_kg=STATED.body_kg), static=None
+    )
 
 
 def leaning(lean_rad, drop_m, patched):

@@ -335,6 +335,7 @@ class Overrule:
     Attributes:
         waive: ERRORs that do not block; shown as waived in every output.
         ignore: findings below ERROR that are not shown and do not lower the verdict.
+        reasons: codes with the user's reason.
 
     Examples:
         >>> kinertia.Overrule(waive=("P244",)).waive
@@ -343,9 +344,14 @@ class Overrule:
 
     waive: tuple[str, ...] = ()
     ignore: tuple[str, ...] = ()
+    reasons: tuple[tuple[str, str], ...] = ()
 
     def __add__(self, other: Overrule) -> Overrule:
-        return Overrule((*self.waive, *other.waive), (*self.ignore, *other.ignore))
+        return Overrule((*self.waive, *other.waive), (*self.ignore, *other.ignore), (*self.reasons, *other.reasons))
+
+    def reason(self, code: str) -> str:
+        """Return the last reason given for this code, its question or its family; empty without."""
+        return next((why for given, why in reversed(self.reasons) if code.startswith(given)), "")
 
 
 def _codes(value: object) -> tuple[str, ...]:
@@ -372,7 +378,7 @@ class Diagnostics(Table):
 
     Examples:
         >>> kinertia.settings.Diagnostics(waive=["P244"], ignore=["M102", "R40"]).overrule
-        Overrule(waive=('P244',), ignore=('M102', 'R40'))
+        Overrule(waive=('P244',), ignore=('M102', 'R40'), reasons=())
     """
 
     ignore: Annotated[tuple[str, ...], BeforeValidator(_codes)] = Field(
@@ -382,11 +388,13 @@ class Diagnostics(Table):
     waive: Annotated[tuple[str, ...], BeforeValidator(_waivable)] = Field(
         default=(), description='ERRORs that do not stop an estimate and are shown as waived, like ["P244"]'
     )
+    reasons: dict[str, str] = Field(default={}, description='why, by code: `{ P244 = "plates were moved" }`')
 
     @property
     def overrule(self) -> Overrule:
         """The codes to waive and to ignore, in the form that findings take."""
-        return Overrule(self.waive, self.ignore)
+        return Overrule(self.waive, self.ignore, tuple(self.reasons.items()))
 
     def __add__(self, other: Diagnostics) -> Diagnostics:
-        return Diagnostics(ignore=(*self.ignore, *other.ignore), waive=(*self.waive, *other.waive))
+        ignore, waive = (*self.ignore, *other.ignore), (*self.waive, *other.waive)
+        return Diagnostics(ignore=ignore, waive=waive, reasons=self.reasons | other.reasons)

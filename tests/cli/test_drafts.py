@@ -5,11 +5,14 @@ import re
 import shutil
 
 import pytest
+import typer
 
 from command_line import fitted, run
 from generic_static import recording, standing_positions
+from kinertia.cli import drafts
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.subject.provenance import command_line
+from kinertia.io.subject.reader import read_subject
 from kinertia.io.text.trc import write_trc
 
 
@@ -83,3 +86,37 @@ def test_a_draft_is_a_marker_set_and_says_what_it_lacks(tmp_path):
     assert run("markers", file, "-o", own).status == 2, "what is there is left alone"
     content = json.loads(run("markers", file, "-o", tmp_path / "other.toml", "--json").out)
     assert (content["needed"], content["notes"]) == (["heel_r"], [])
+
+
+def with_two_walks(folder, lab):
+    for name, source in {"static": "static", "walk1": "walk", "walk2": "walk"}.items():
+        shutil.copyfile(lab / f"{source}.c3d", folder / f"{name}.c3d")
+    return folder
+
+
+def test_init_writes_what_options_state_and_asks_nothing_without_a_terminal(tmp_path, c3d_lab):
+    folder = with_two_walks(tmp_path, c3d_lab)
+    outcome = run("init", folder, "--sex", "f", "--age", "9,5", "--mass", "31", "--condition", "walk2=with orthosis")
+    assert outcome.status == 0
+    wanted = read_subject(folder / "subject.toml")
+    stated = wanted.subject
+    assert (stated.sex, stated.age_years, stated.mass_kg) == ("female", 9.5, 31.0)
+    assert {one.name: one.condition for one in wanted.trials} == {"walk1": "", "walk2": "with orthosis"}
+
+
+@pytest.mark.parametrize("given", ["walk2", "=x", "walk3=barefoot"])
+def test_init_refuses_a_condition_of_no_trial(tmp_path, c3d_lab, given):
+    folder = with_two_walks(tmp_path, c3d_lab)
+    assert run("init", folder, "--condition", given).status == 2
+    assert not (folder / "subject.toml").exists()
+
+
+def test_init_asks_in_a_terminal_for_what_is_not_known(tmp_path, c3d_lab, monkeypatch):
+    folder = with_two_walks(tmp_path, c3d_lab)
+    answers = {"Sex, male or female (m, f)": ["x", "m"], "Age, years": ["52"], "Condition of walk2": ["barefoot"]}
+    monkeypatch.setattr(drafts, "_in_terminal", lambda: True)
+    monkeypatch.setattr(typer, "prompt", lambda question, **_: answers.get(question, [""]).pop(0))
+    assert run("init", folder, "--mass", "72.6", "--height", "1.8").status == 0
+    wanted = read_subject(folder / "subject.toml")
+    assert (wanted.subject.sex, wanted.subject.age_years, wanted.subject.mass_kg) == ("male", 52.0, 72.6)
+    assert {one.name: one.condition for one in wanted.trials} == {"walk1": "", "walk2": "barefoot"}

@@ -12,6 +12,7 @@ import typer
 import findings
 import house
 import reference
+import signs
 from command_line import run
 from examples import MEASURED, PAGES, ROOT, SYNTHETIC, blocks, difference, link_measured, renewed
 from kinertia.cli.commands import application
@@ -171,6 +172,15 @@ def test_results_page_names_every_file_and_column(fit_of):
     assert set(_column("results.md", "<!-- keys of fit.json -->")) == set(fitted.summary)
     assert set(_column("results.md", "<!-- keys of a trial -->")) == set(fitted.trial)
     assert _column("results.md", "<!-- columns of calibration -->") == list(fitted.summary["calibration"][0])
+
+
+@pytest.mark.parametrize("joint", signs.JOINTS)
+def test_the_pictures_of_signs_are_drawn_with_the_words_of_reports(joint):
+    assert signs.picture(joint).read_text(encoding="utf-8") == signs.drawn(joint)
+    assert f"figures/{signs.picture(joint).name}" in (ROOT / "docs" / "report.md").read_text(encoding="utf-8")
+    for view in signs.JOINTS[joint]:
+        for named in signs.directions(view).values():
+            assert view.movement in named.values(), "the arrow is with the movement in one of the conventions"
 
 
 def test_the_house_is_drawn_from_the_contract():

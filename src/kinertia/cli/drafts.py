@@ -1,12 +1,16 @@
 """Defines `kinertia init` and `kinertia markers`: drafts of a subject file and of a marker set."""
 
 import os
+import sys
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from kinertia.cli.common import Outcome, out, plain_table
+from kinertia.cli.common import Height, Mass, Outcome, Sex, number, out, plain_table
+from kinertia.cli.common import sex as parsed_sex
 from kinertia.errors import FileError
 from kinertia.io.file_names import missing_file
 from kinertia.io.marker_set_draft import draft_marker_set, preset_of
@@ -26,22 +30,33 @@ _LISTED = 6
 
 def init(
     folder: Annotated[Path, typer.Argument(help="One person's folder, or any file in it.")],
+    sex: Sex = None,
+    age: Annotated[float | None, typer.Option(parser=number, metavar="YEARS", help="Age, years.")] = None,
+    mass: Mass = None,
+    height: Height = None,
+    condition: Annotated[
+        list[str] | None,
+        typer.Option(metavar="TRIAL=NAME", help="Condition of a trial; may be repeated."),
+    ] = None,
     measures: Annotated[
         bool, typer.Option("--measures", help="Write the sheet of girths and lengths to fill in, and no subject.toml.")
     ] = False,
 ) -> Outcome:
     """Write a first subject.toml from the files in a folder.
 
+    In a terminal it asks for what is not known of the person and for
+    conditions; Enter skips.
+
     Where no marker-set preset fits the static trial, a draft of one,
     markers.toml, is written beside it.
 
     A completed sheet of girths and lengths in the folder is used. --measures
     writes an empty one, measures.csv, with a picture of where to measure,
-    measures.svg. Fill in as many as you have time for.
+    measures.svg.
 
     [bold]Example[/]
 
-    kinertia init data/subject01
+    kinertia init data/subject01 --sex f --age 9 --condition walk1=barefoot
     """
     folder = folder.parent if folder.is_file() else folder
     if measures:
@@ -51,7 +66,16 @@ def init(
         raise FileError(path, "already exists and was not changed; remove it to draft a new one")
     if folder.is_dir() and not os.access(folder, os.W_OK):
         raise FileError(folder, "cannot be written to; copy the files into a folder of your own, and draft it there")
-    files = init_files(folder)
+    given = {"sex": sex, "mass_kg": mass, "height_m": height, "age_years": age}
+    stated: dict[str, object] = {key: value for key, value in given.items() if value is not None}
+    conditions = _conditions(condition or ())
+    files = init_files(folder, stated=stated, conditions=conditions)
+    content = tomllib.loads(files[SUBJECT])
+    if _in_terminal():
+        stated |= _asked(content.get("subject", {}))
+        conditions |= _asked_conditions(content.get("trial", []), conditions)
+        files = init_files(folder, stated=stated, conditions=conditions)
+    _expect_trials(conditions, content.get("trial", []))
     for name, text in sorted(files.items()):
         write_then_rename(folder / name, text)
     lines = files[SUBJECT].splitlines()
@@ -67,6 +91,63 @@ def init(
     asked = [line.removeprefix("# ").partition(" =")[0] for line in lines if FILL_IN in line]
     marker_set = str(own) if MARKER_SET in files else None
     return Outcome({"subject_file": str(path), "marker_set": marker_set, "fill_in": asked, "notes": notes})
+
+
+def _in_terminal() -> bool:
+    """Return whether there is somebody to answer."""
+    return sys.stdin.isatty() and sys.stdout.isatty() and not out.quiet
+
+
+_QUESTIONS: Mapping[str, tuple[str, Callable[[str], object]]] = {
+    "sex": ("Sex, male or female (m, f)", parsed_sex),
+    "age_years": ("Age, years", number),
+    "mass_kg": ("Body mass, kg", number),
+    "height_m": ("Stature, m", number),
+}
+
+
+def _asked(known: Mapping[str, object]) -> dict[str, object]:
+    """Ask for what is not known of the person; an empty answer leaves it open."""
+    answers: dict[str, object] = {}
+    for key, (question, parse) in _QUESTIONS.items():
+        while key not in known and key not in answers:
+            text = typer.prompt(question, default="", show_default=False).strip()
+            if not text:
+                break
+            try:
+                answers[key] = parse(text)
+            except typer.BadParameter as error:
+                out.print(error.message)
+    return answers
+
+
+def _asked_conditions(trials: Sequence[Mapping[str, str]], known: Mapping[str, str]) -> dict[str, str]:
+    """Ask for the condition of each trial, where there are several."""
+    names = [Path(one["markers"]).stem for one in trials]
+    if known or len(names) < 2:
+        return {}
+    answers = {name: typer.prompt(f"Condition of {name}", default="", show_default=False).strip() for name in names}
+    return {name: text for name, text in answers.items() if text}
+
+
+def _conditions(given: Sequence[str]) -> dict[str, str]:
+    """Parse conditions given as TRIAL=NAME.
+
+    Raises:
+        BadParameter: one lacks its trial or its name.
+    """
+    pairs = [one.partition("=")[::2] for one in given]
+    for (trial, name), text in zip(pairs, given, strict=True):
+        if not trial.strip() or not name.strip():
+            raise typer.BadParameter(f"'{text}' is no condition of a trial; write it as walk1=barefoot")
+    return {trial.strip(): name.strip() for trial, name in pairs}
+
+
+def _expect_trials(conditions: Mapping[str, str], trials: Sequence[Mapping[str, str]]) -> None:
+    """Raise an error about a condition of a trial that is not in the folder."""
+    names = [Path(one["markers"]).stem for one in trials]
+    if unknown := [trial for trial in conditions if trial not in names]:
+        raise typer.BadParameter(f"there is no trial '{unknown[0]}'; trials are {', '.join(names)}")
 
 
 def _measures(folder: Path) -> Outcome:

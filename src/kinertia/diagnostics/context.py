@@ -75,6 +75,10 @@ class RecordingContext(MarkerContext):
             return span
         return min(span[0], self.window_s[0]), max(span[1], self.window_s[1])
 
+    def uses(self, span_s: tuple[float, float]) -> bool:
+        """Return whether a span (s) is not wholly outside the window that the user states."""
+        return self.window_s is None or (span_s[0] <= self.window_s[1] and self.window_s[0] <= span_s[1])
+
     @cached_property
     def measured_markers(self) -> Markers:
         """`markers` within the part used, without copies of dropped frames."""

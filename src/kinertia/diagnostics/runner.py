@@ -204,11 +204,13 @@ def overruled(
     """
     result = []
     for one in findings:
-        rule_of_trial = (of_trials or {}).get(one.where.trial or "", Overrule())
+        given = overrule + (of_trials or {}).get(one.where.trial or "", Overrule())
         is_error = one.severity is Severity.ERROR
-        codes = (overrule + rule_of_trial).waive if is_error else (overrule + rule_of_trial).ignore
-        stands = not any(one.code.startswith(code) for code in codes) or (is_error and one.rule.hard)
-        result.append(replace(one, status="open" if stands else "waived" if is_error else "ignored"))
+        codes = given.waive if is_error else given.ignore
+        if not any(one.code.startswith(code) for code in codes) or (is_error and one.rule.hard):
+            result.append(replace(one, status="open"))
+        else:
+            result.append(replace(one, status="waived" if is_error else "ignored", reason=given.reason(one.code)))
     return _released(result)
 
 

@@ -43,6 +43,7 @@ class Finding:
         causes: likely causes, likeliest first; the rule's if empty.
         muted_by: code of the finding that explains this one.
         status: "open", "waived" or "ignored".
+        reason: why the user overruled it.
 
     Examples:
         >>> zero = kinertia.finding("P213", kinertia.Where("walk.c3d", plate="plate 1", axis="vertical", file_axis="Z"),
@@ -60,6 +61,7 @@ class Finding:
     causes: tuple[str, ...] = ()
     muted_by: str | None = None
     status: Status = "open"
+    reason: str = ""
 
     def __post_init__(self) -> None:
         # saved results hold it as a number
@@ -148,6 +150,7 @@ class Finding:
             "effect": self.effect,
             "causes": list(self.likely_causes),
             "remedy": self.remedy,
+            **({"reason": self.reason} if self.reason else {}),
         }
 
     def _said(self, template: str) -> str:

@@ -30,6 +30,7 @@ class Rule:
         affects: outputs that an open WARNING lowers to "use with care".
         supersedes: codes, or questions like "T20", whose findings are a consequence of this one.
         resolves: codes of warnings about the same quantity that this correction lowers to CORRECTED.
+        settings: settings of the subject file that the remedy proposes (`findings.remedy`).
         causes: likely causes, likeliest first.
 
     Examples:
@@ -51,6 +52,7 @@ class Rule:
     affects: tuple[str, ...] = ()
     supersedes: tuple[str, ...] = ()
     resolves: tuple[str, ...] = ()
+    settings: tuple[str, ...] = ()
     causes: tuple[str, ...] = ()
 
     @property

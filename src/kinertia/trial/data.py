@@ -234,6 +234,16 @@ class Recording:
         """Reasons why plates in the file cannot be used, one per plate."""
         return tuple(one.message for one in self.findings if one.code == "F151")
 
+    def without_markers(self, labels: Sequence[str]) -> Recording:
+        """Return the recording without these markers.
+
+        Raises:
+            MarkerSetError: L104, it has no such marker.
+        """
+        self.markers.select(labels)  # which raises
+        kept = [label for label in self.markers.labels if label not in labels]
+        return replace(self, markers=self.markers.select(kept)) if labels else self
+
     def without_empty_markers(self) -> Recording:
         """Return the recording without markers that no frame shows, with a finding M101 for each of them."""
         seen = self.markers.seen

@@ -27,7 +27,7 @@ def test_plug_in_gait_from_dropping_to_the_verdict_and_as_on_the_command_line(ta
     assert tab.page.get_by_role("heading", level=1).inner_text() == "Subject A"
     playwright.expect(tab.page.locator(".message.warning")).to_contain_text("Sex is missing")
     tab.fill(sex="male", mass="72,6", height="1.803").check().checked()
-    playwright.expect(tab.page.locator("section[aria-labelledby=check] .headline")).to_be_in_viewport()
+    playwright.expect(tab.page.locator(".outlook .headline")).to_be_in_viewport()
     verdict = tab.estimate().verdict()
     theirs = load_fit(fitted(tmp_path / "out", c3d_lab / "subject.toml").folder)
     ours = load_fit(tab.person().results)

@@ -129,7 +129,7 @@ def test_what_was_not_finished_is_said_to_be_interrupted_and_what_was_stays(libr
     (ben.results / "fit.json").write_text("{}")
     outcome = {
         "summary": sha256(ben.results / "fit.json"),
-        **digest(Overview((), 61, 1)),
+        **digest(Overview((), 61, 1), {}),
         "ended": 1.7e9,
     }
     (ben.results / "outcome.json").write_text(json.dumps(outcome))

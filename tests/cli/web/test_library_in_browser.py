@@ -71,7 +71,7 @@ def test_a_fit_that_ends_repeats_no_form(browser, app, monkeypatch, tmp_path, c3
     playwright.expect(page).to_have_url(f"{app.address}people/{person.name}")
     go.touch()
     playwright.expect(page.locator("[data-progress]")).to_have_count(0)
-    playwright.expect(page).to_have_url(f"{app.address}people/{person.name}#results")
+    playwright.expect(page).to_have_url(f"{app.address}people/{person.name}#outcome")
     page.reload()
     assert sent == ["fit", "copy"]
     page.close()
@@ -131,7 +131,7 @@ def test_a_person_is_renamed_and_results_stay_those_of_the_files(tab, app, c3d_l
     tab.page.get_by_label("Name in the library").press("Enter")
     playwright.expect(tab.page.get_by_role("heading", level=1)).to_have_text("Eva (spring)")
     results = tab.page.locator("section[aria-labelledby=results]")
-    playwright.expect(results.locator(".headline")).to_have_class("headline warning")
+    playwright.expect(tab.page.locator(".outlook .headline")).to_have_class("headline warning")
     playwright.expect(results.get_by_text("before your last change")).to_have_count(0)
     tab.quiet()
 
@@ -150,8 +150,8 @@ def test_the_first_screen_has_what_may_be_used_and_what_to_do_next(browser, app,
     codes = [one["code"] for one in outcome["steps"]]
     assert codes
     assert len(codes) <= 3
-    playwright.expect(first.locator("ol a")).to_have_text(codes)
-    steps = first.locator("ol").bounding_box()
+    playwright.expect(first.locator("> .findings a")).to_have_text(codes)
+    steps = first.locator("> .findings").bounding_box()
     assert steps["y"] + steps["height"] <= viewport["height"]
     tab.quiet()
 

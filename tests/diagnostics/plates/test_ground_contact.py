@@ -58,6 +58,11 @@ def test_a_heel_behind_its_plate():
     assert 0.15 <= span[0] < span[1] <= 0.85, "the markers of that foot are slow so long"
 
 
+@pytest.mark.parametrize(("window_s", "count"), [((0.5, 1.5), 1), ((1.0, 1.5), 0)])
+def test_a_step_that_a_stated_window_leaves_out_is_not_reported(window_s, count):
+    assert len([*plate_edges(replace(context_of(on_plates(0.06), FEET), window_s=window_s))]) == count
+
+
 @pytest.mark.parametrize(("lost_s", "lands_or_leaves_s"), [((0.0, 0.3), 0.2), ((0.7, 1.0), 0.8)])
 def test_a_foot_that_lands_or_leaves_beside_its_plate(lost_s, lands_or_leaves_s):
     """The plate bears nothing before, or after; the foot stands all the same."""

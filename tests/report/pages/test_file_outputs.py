@@ -63,6 +63,9 @@ def test_report_and_comparison_show_them(fit, with_outputs):
     stated = with_outputs()
     page = render(stated)
     assert 'id="beside"' in page
+    folded = page.partition('id="beside"')[2].partition("</section>")[0]
+    assert "Knee flexion angle" in folded
+    assert ("extension moment" in folded.partition("<details>")[0]) == ('id="vicon"' not in page), "not twice"
     assert "right, in the file" in str(figures_of(page))
     both = {"before": fit, "after": stated}
     assert "after, walk</h3>" in render_comparison(both)

@@ -149,7 +149,7 @@ def test_places_are_named_as_far_as_they_are_known():
 
 
 def test_the_page_in_the_browser_gets_verdict_and_open_findings():
-    told = digest(Overview(UNUSABLE, 61, 1))
+    told = digest(Overview(UNUSABLE, 61, 1), {})
     assert told["verdict"] == "do not use"
     assert [(one["code"], one["severity"], one["status"]) for one in told["findings"]] == [
         (WAIVED.code, "ERROR", "waived"),

@@ -17,6 +17,7 @@ from kinertia.cli.web.file_table import (
 )
 from kinertia.cli.web.library import SUBJECT, PersonFolder
 from kinertia.cli.web.rows import Field, choices_of, with_rows
+from kinertia.cli.web.trial_fields import with_trial_fields
 from kinertia.errors import KinertiaError, SettingsError
 from kinertia.io.marker_set_file import preset_names
 from kinertia.io.output_folder import write_then_rename
@@ -45,8 +46,6 @@ _MARKER_SET = "marker_set"
 _ABOUT_MARKER_SET = "blank: detected from the labels if most of a preset's are there"
 USE = "use:"
 """Prefix of the form's fields for the use of a file; the file's name follows."""
-CONDITION = "condition:"
-"""The same for the condition of a trial."""
 
 
 def label_of(key: str) -> str:
@@ -156,34 +155,12 @@ def write_form(person: PersonFolder, form: Mapping[str, str]) -> None:
     rows = file_table(person.files(), content)
     known = {row.name: uses.get(row.name, row.use) for row in rows if row.choices}
     changed = with_rows({**content, "subject": subject}, form)
-    changed = _with_conditions(changed, form)
+    changed = with_trial_fields(changed, form)
     if _MARKER_SET in form:
         changed["model"] = {**_model(content), "markers": form[_MARKER_SET]}
         if not form[_MARKER_SET]:
             del changed["model"]["markers"]
     _write_uses(person, content, changed, known)
-
-
-def conditions(content: Content) -> dict[str, str]:
-    """Return the stated condition of each trial by its file; trials without one are left out."""
-    trials = content.get("trial")
-    known = [one for one in trials if isinstance(one, Mapping)] if isinstance(trials, list) else []
-    return {str(one.get("markers", "")): str(one["condition"]) for one in known if one.get("condition")}
-
-
-def _with_conditions(content: Content, form: Mapping[str, str]) -> Content:
-    """Return the entries with the conditions of the form; an empty one removes it."""
-    if not any(name.startswith(CONDITION) for name in form) or not isinstance(content.get("trial"), list):
-        return content
-    trials = []
-    for one in content["trial"]:
-        name = CONDITION + str(one.get("markers", "")) if isinstance(one, Mapping) else ""
-        if name in form:
-            rest = {key: value for key, value in one.items() if key != "condition"}
-            text = form[name].strip()
-            one = {**rest, "condition": text} if text else rest
-        trials.append(one)
-    return {**content, "trial": trials}
 
 
 def _write_uses(person: PersonFolder, before: Content, changed: Content, uses: Mapping[str, str]) -> None:

@@ -1,8 +1,8 @@
-"""Queues checks and fits, runs each in a process of its own, and reports its progress."""
+"""Queues checks, fits and comparisons of conditions, runs each in a process of its own, and reports its progress."""
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
@@ -12,7 +12,7 @@ from kinertia.cohort.process import PYTHON, Process
 from kinertia.errors import internal_error
 from kinertia.model.compiled import is_compiled
 
-KINDS = ("check", "fit")
+KINDS = ("check", "fit", "comparison")
 _PATIENCE_S = 5.0
 _ENDED_FROM_OUTSIDE = (-9, -15)
 """SIGKILL and SIGTERM, as Python reports them."""
@@ -89,21 +89,23 @@ class Work:
 
 
 class Job(Work):
-    """A check or a fit that waits or is running.
+    """A check, a fit or a comparison that waits or is running.
 
     Attributes:
         person: the person.
-        kind: "check" or "fit".
+        kind: "check", "fit" or "comparison".
+        arguments: further arguments of the worker: the conditions of a comparison.
     """
 
-    def __init__(self, person: PersonFolder, kind: str) -> None:
+    def __init__(self, person: PersonFolder, kind: str, arguments: Sequence[str] = ()) -> None:
         super().__init__()
         self.person = person
         self.kind = kind
+        self.arguments = tuple(arguments)
 
     def run(self) -> dict[str, Any]:
         """Run the job; return how it ended, for the person's notes."""
-        ended = self.done(self.kind, str(self.person.folder))
+        ended = self.done(self.kind, str(self.person.folder), *self.arguments)
         if self.cancelled:
             return {"how": "cancelled"}
         path = self.person.folder / LOG
@@ -120,7 +122,7 @@ class Job(Work):
 
 
 class Jobs:
-    """Two queues of people: one for checks, which take seconds, and one for fits.
+    """Queues of people: one for checks, which take seconds, one for fits, and one for comparisons.
 
     Attributes:
         preparing: one-time compilation on a machine, until it is done; fits wait for it.
@@ -133,12 +135,12 @@ class Jobs:
         self._changed = threading.Condition()
         self._closed = False
 
-    def add(self, person: PersonFolder, kind: str) -> None:
-        """Queue a check or a fit of a person, unless one is queued already."""
+    def add(self, person: PersonFolder, kind: str, *arguments: str) -> None:
+        """Queue a check, a fit or a comparison of a person, unless one is queued already."""
         with self._changed:
             if self.of(person, kind) is None:
                 person.note(**{kind: started()})
-                self._lines[kind].append(Job(person, kind))
+                self._lines[kind].append(Job(person, kind, arguments))
                 self._changed.notify_all()
 
     def of(self, person: PersonFolder, kind: str) -> Job | None:

@@ -5,6 +5,7 @@
             subject.toml, static.c3d, walk1.c3d, ...    what `kinertia fit` takes
             check/check.html                            what `kinertia check` wrote
             results/                                    what `kinertia fit` wrote
+        comparison/compare.html                     what `kinertia compare --conditions` wrote
 
 All that is known about a person is in the folder: there is no index that could contradict it.
 """
@@ -30,7 +31,7 @@ from kinertia.io.subject.provenance import sha256
 from kinertia.io.subject.reader import read_subject
 from kinertia.io.working_folder import sole_use, sweep
 
-SUBJECT, SUMMARY, OUTCOME = "subject.toml", "fit.json", "outcome.json"
+SUBJECT, SUMMARY, OUTCOME, NORMS = "subject.toml", "fit.json", "outcome.json", "norms.csv"
 LOG = "failure.log"
 """Log that a crash left for the developers."""
 _RECORD, _LOCK = ".kinertia-person.json", ".kinertia-app.lock"
@@ -73,6 +74,11 @@ class PersonFolder:
         return self.folder / "results"
 
     @property
+    def comparison(self) -> Path:
+        """Folder of the comparison of two conditions."""
+        return self.folder / "comparison"
+
+    @property
     def fitted(self) -> bool:
         """Whether there are results."""
         return (self.results / SUMMARY).is_file()
@@ -98,10 +104,10 @@ class PersonFolder:
             return ""
 
     def outcome(self, kind: str) -> dict[str, Any]:
-        """Return the outcome that the last check or fit left beside its files; empty without, or if other results'."""
+        """Return the outcome that the last check, fit or comparison left; empty without, or if of other results."""
         outcome = _json(getattr(self, kind) / OUTCOME)
         summary = self.results / SUMMARY
-        if kind == "results" and (not summary.is_file() or outcome.get("summary") != sha256(summary)):
+        if kind != "check" and (not summary.is_file() or outcome.get("summary") != sha256(summary)):
             return {}
         return outcome
 
@@ -133,7 +139,7 @@ class Library:
     @property
     def norms(self) -> Path:
         """Path of the laboratory's norms, which need not exist."""
-        return self.folder / "norms.csv"
+        return self.folder / NORMS
 
     @contextmanager
     def opened(self) -> Iterator[None]:

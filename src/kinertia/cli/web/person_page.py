@@ -11,19 +11,21 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
 from kinertia.cli.learning import norms_text
-from kinertia.cli.web.entries import CONDITION, USE, conditions, entries, fields, label_of, marker_set_field, trouble
+from kinertia.cli.web.entries import USE, entries, fields, label_of, marker_set_field, trouble
 from kinertia.cli.web.file_table import file_table
 from kinertia.cli.web.jobs import KINDS, Job, Jobs
 from kinertia.cli.web.library import LIMITS, Library, PersonFolder
+from kinertia.cli.web.remedies import Button, applied
 from kinertia.cli.web.responses import page, time_left
 from kinertia.cli.web.rows import rows as rows_of
+from kinertia.cli.web.trial_fields import CONDITION, END, START, conditions, trial_fields
 from kinertia.errors import KinertiaError
 from kinertia.estimation.result.mean_cycles import Control, band_columns
 from kinertia.io.norms_file import read_norms
 from kinertia.io.output_folder import write_then_rename
 from kinertia.model.marker_set import SEGMENTS
 from kinertia.report.comparison.side_by_side import render_comparison
-from kinertia.report.comparison.what_changed import compare, compared_sessions
+from kinertia.report.comparison.what_changed import compared_sessions
 from kinertia.report.exports.saved_fit import load_fit, read_saved
 from kinertia.report.pages.finding_view import LOOKS
 from kinertia.report.pages.page import render
@@ -118,7 +120,7 @@ def person_page(
         content = entries(person)
     except KinertiaError as error:
         broken = str(error)
-    rows, stated = file_table(person.files(), dict(content)), conditions(dict(content))
+    rows = file_table(person.files(), dict(content))
     notes = person.notes()
     found = trouble(person) if person.subject.is_file() else notes.get("draft", "")
     return page(
@@ -128,9 +130,10 @@ def person_page(
         person=person,
         rows=rows,
         use=USE,
-        condition=CONDITION,
-        condition_of={row.name: (typed or {}).get(CONDITION + row.name, stated.get(row.name, "")) for row in rows},
-        conditions=list(dict.fromkeys(stated.values())),
+        keys={"condition": CONDITION, "start": START, "end": END},
+        own=trial_fields(dict(content), [row.name for row in rows], typed or {}),
+        conditions=conditions(dict(content)),
+        applied=applied(person, dict(content)),
         uses={row.name: (typed or {}).get(USE + row.name, row.use) for row in rows},
         fields=fields(dict(content), typed),
         marker_set=marker_set_field(dict(content), typed),
@@ -155,13 +158,14 @@ def person_page(
 
 
 def _outcomes(person: PersonFolder) -> dict[str, Any]:
-    """Collect everything that the template shows of the last check and the last fit; old: of other files."""
+    """Collect everything that the template shows of the last check, fit and comparison; old: of other files."""
     checked, results = (_known(person.outcome(kind)) for kind in ("check", "results"))
     fitted = results if person.fitted else {}
     pages = {"results/report.html": fitted, "check/check.html": checked}
     latest = [(page, one) for page, one in pages.items() if one and one.get("inputs") == person.inputs]
     return {
-        "latest": {"purposes": [], "steps": [], **latest[0][1], "page": latest[0][0]} if latest else {},
+        "latest": {"purposes": [], "steps": [], **_with_buttons(latest[0][1]), "page": latest[0][0]} if latest else {},
+        "compared": person.outcome("comparison"),
         "check": checked,
         "check_page": (person.check / "check.html").is_file(),
         "check_old": bool(checked) and checked.get("inputs") != person.inputs,
@@ -169,6 +173,19 @@ def _outcomes(person: PersonFolder) -> dict[str, Any]:
         "fitted": person.fitted,
         "results_old": bool(results) and results.get("inputs") != person.inputs,
         "result_files": _result_files(person),
+    }
+
+
+def _with_buttons(outcome: Mapping[str, Any]) -> dict[str, Any]:
+    """Return an outcome whose findings have buttons; those after the steps that come first are `others`."""
+    shown = {
+        kind: [{**one, "buttons": [Button.of(each) for each in one.get("settings", [])]} for one in outcome[kind]]
+        for kind in ("steps", "findings")
+    }
+    return {
+        **outcome,
+        "steps": shown["steps"],
+        "others": [one for one in shown["findings"] if one not in shown["steps"]],
     }
 
 
@@ -230,12 +247,6 @@ def people_compared(people: Sequence[PersonFolder], library: Library) -> str:
     fits = {person.name: load_fit(person.results) for person in people}
     found, reason = compared_sessions(list(fits.values()), norms=library.norms if library.norms.is_file() else None)
     return render_comparison(fits, None if found is None else found.shown(), reason)
-
-
-def conditions_compared(person: PersonFolder, conditions: tuple[str, str], library: Library) -> str:
-    """Render what changed between two conditions of one session."""
-    norms = library.norms if library.norms.is_file() else None
-    return compare(person.results, conditions=conditions, norms=norms).page()
 
 
 def make_norms(people: Sequence[PersonFolder], library: Library) -> None:

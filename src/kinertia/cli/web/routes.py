@@ -1,7 +1,7 @@
 """Maps addresses to handlers. Everything is a page, a form or a file; the state is in the library's folders."""
 
 import shutil
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -10,7 +10,7 @@ from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import HTMLResponse, JSONResponse, Response
+from starlette.responses import JSONResponse, Response
 from starlette.routing import BaseRoute, Mount, Route
 from starlette.staticfiles import StaticFiles
 
@@ -19,20 +19,17 @@ from kinertia.cli.web.jobs import KINDS, Jobs
 from kinertia.cli.web.library import ENDINGS, LIMITS, Library, PersonFolder, receive
 from kinertia.cli.web.marker_page import marker_routes
 from kinertia.cli.web.person_page import person_page, progress, standing
+from kinertia.cli.web.remedies import apply, undo
 from kinertia.cli.web.responses import (
-    RESULT_POLICY,
-    archive,
-    chosen_folder,
     expect,
     form,
     page,
-    pairs,
     result_file,
     time_left,
     to,
 )
+from kinertia.cli.web.result_routes import result_routes
 from kinertia.errors import KinertiaError, internal_error
-from kinertia.io.output_folder import complete_folder, expect_own_folder
 from kinertia.io.samples import SIZE_MB
 from kinertia.io.subject.body_files import measures_sheet
 from kinertia.report.figures.measures_picture import measures_picture
@@ -40,10 +37,13 @@ from kinertia.report.figures.measures_picture import measures_picture
 Example = Callable[[Path], object]
 """Writes the files of a person to try the page with into a folder."""
 _STATIC = Path(__file__).with_name("static")
-_FORMS = ("files", "recognise", "remove", "entries", "keep", "text", "delete", "copy", "rename", *KINDS)
+_FORMS = (
+    *("files", "recognise", "remove", "entries", "keep", "text", "remedy", "undo", "delete", "copy", "rename"),
+    *KINDS,
+)
 """Addresses below a person's that forms are sent to."""
-_SECTIONS = {"check": "check", "fit": "results"}
-"""Section of a person's page that shows the progress of a check or a fit."""
+_SECTIONS = {"check": "check", "fit": "results", "comparison": "comparison"}
+"""Section of a person's page that shows the progress of a check, a fit or a comparison."""
 
 
 def application(library: Library, jobs: Jobs, stop: Callable[[], None], examples: Mapping[str, Example]) -> Starlette:
@@ -53,9 +53,6 @@ def application(library: Library, jobs: Jobs, stop: Callable[[], None], examples
         Route("/", actions.home),
         Route("/people", actions.add, methods=["POST"]),
         Route("/example/{kind}", actions.add_example, methods=["POST"]),
-        Route("/compare", actions.compare),
-        Route("/compare/page", actions.compared),
-        Route("/norms", actions.norms, methods=["POST"]),
         Route("/measures.csv", actions.measures_sheet),
         Route("/measures.svg", actions.measures_picture),
         Route("/preparing", actions.preparing),
@@ -67,17 +64,14 @@ def application(library: Library, jobs: Jobs, stop: Callable[[], None], examples
         Route("/people/{name}/entries", actions.entries, methods=["POST"]),
         Route("/people/{name}/keep", actions.keep, methods=["POST"]),
         Route("/people/{name}/text", actions.text, methods=["POST"]),
+        Route("/people/{name}/remedy", actions.remedy, methods=["POST"]),
+        Route("/people/{name}/undo", actions.undo, methods=["POST"]),
         Route("/people/{name}/rename", actions.rename, methods=["POST"]),
         Route("/people/{name}/delete", actions.delete, methods=["POST"]),
         Route("/people/{name}/progress", actions.progress),
         Route("/people/{name}/subject.toml", actions.subject_file),
-        Route("/people/{name}/results.zip", actions.zipped),
-        Route("/people/{name}/letter", actions.letter),
-        Route("/people/{name}/conditions", actions.conditions),
-        Route("/people/{name}/copy", actions.copy, methods=["POST"]),
-        Route("/people/{name}/check/{file:path}", actions.check_file),
-        Route("/people/{name}/results/{file:path}", actions.file),
         *marker_routes(library, jobs),
+        *result_routes(library, jobs),
         Route("/people/{name}/{kind}", actions.start, methods=["POST"]),
         Route("/people/{name}/{kind}/cancel", actions.cancel, methods=["POST"]),
         Route("/people/{name}/{action}", actions.back),
@@ -194,10 +188,28 @@ class _Actions:
             return await run_in_threadpool(person_page, request, person, self._jobs, str(error), text_typed=typed)
         return self._checked(request, person)
 
+    async def remedy(self, request: Request) -> Response:
+        """Write the setting of a remedy that a finding proposes, and check again."""
+        person, given = self._idle(request), await form(request)
+        try:
+            await run_in_threadpool(apply, person, given.get("setting", ""), given.get("reason", ""))
+        except KinertiaError as error:
+            return await run_in_threadpool(person_page, request, person, self._jobs, str(error))
+        return self._checked(request, person)
+
+    async def undo(self, request: Request) -> Response:
+        """Restore what stood in place of a remedy's setting, and check again."""
+        person, given = self._idle(request), await form(request)
+        await run_in_threadpool(undo, person, given.get("setting", ""))
+        return self._checked(request, person)
+
     async def start(self, request: Request) -> Response:
-        """Queue a check or a fit, with the entries of the form if it was sent."""
+        """Queue a check or a fit, with the entries of the form if it was sent; or the comparison of two conditions."""
         person, kind = self._person(request), self._kind(request)
         given = await form(request)
+        if kind == "comparison":
+            self._jobs.add(person, kind, given.get("before", ""), given.get("after", ""))
+            return to(request, "people", person.name, section=_SECTIONS[kind])
         if given and not self._jobs.busy(person):
             try:
                 write_form(person, given)
@@ -220,7 +232,7 @@ class _Actions:
         return to(request, "people", self._person(request).name)
 
     async def progress(self, request: Request) -> Response:
-        """Return the progress of the person's check and fit."""
+        """Return the progress of the person's check, fit and comparison."""
         return JSONResponse(progress(self._person(request), self._jobs))
 
     async def preparing(self, request: Request) -> Response:
@@ -245,79 +257,6 @@ class _Actions:
     async def subject_file(self, request: Request) -> Response:
         """Serve the subject file, to be saved."""
         return result_file(self._person(request).folder, "subject.toml")
-
-    async def check_file(self, request: Request) -> Response:
-        """Serve a file that `check` wrote."""
-        return result_file(self._person(request).check, request.path_params["file"])
-
-    async def file(self, request: Request) -> Response:
-        """Serve a file of the results."""
-        return result_file(self._person(request).results, request.path_params["file"])
-
-    async def zipped(self, request: Request) -> Response:
-        """Serve all results as an archive."""
-        person = self._person(request)
-        if not person.fitted:
-            raise HTTPException(404, "there are no results yet")
-        return await run_in_threadpool(archive, person)
-
-    async def copy(self, request: Request) -> Response:
-        """Write the results into a folder that the user chooses."""
-        person = self._person(request)
-        try:
-            folder = chosen_folder((await form(request)).get("folder", ""))
-            await run_in_threadpool(_copied, person, folder)
-        except KinertiaError as error:
-            return await run_in_threadpool(person_page, request, person, self._jobs, str(error))
-        return await run_in_threadpool(person_page, request, person, self._jobs, said=f"The results are in {folder}.")
-
-    async def compare(self, request: Request) -> Response:
-        """Show the comparison of chosen results."""
-        from kinertia.report.comparison.side_by_side import MOST_FITS
-
-        chosen = self._chosen(request)
-        problem = "" if 2 <= len(chosen) <= MOST_FITS else f"Choose 2 to {MOST_FITS} people with results."
-        return page(request, "compare.html.j2", people=chosen, problem=problem, query=request.url.query)
-
-    async def compared(self, request: Request) -> Response:
-        """Serve what `kinertia compare` writes about them."""
-        from kinertia.cli.web.person_page import people_compared
-        from kinertia.report.comparison.side_by_side import MOST_FITS
-
-        chosen = self._chosen(request)
-        if not 2 <= len(chosen) <= MOST_FITS:
-            raise HTTPException(404, "nothing to compare")
-        return _result(await run_in_threadpool(people_compared, chosen, self._library))
-
-    async def letter(self, request: Request) -> Response:
-        """Serve the letter of a person, to be printed."""
-        from kinertia.cli.web.person_page import letter
-
-        person = self._person(request)
-        if not person.fitted:
-            raise HTTPException(404, "there are no results yet")
-        return _result(await run_in_threadpool(letter, person, self._library))
-
-    async def conditions(self, request: Request) -> Response:
-        """Serve the comparison of two conditions of a person."""
-        from kinertia.cli.web.person_page import conditions_compared
-
-        person, asked = self._person(request), request.query_params
-        if not person.fitted:
-            raise HTTPException(404, "there are no results yet")
-        wanted = (asked.get("before", ""), asked.get("after", ""))
-        return _result(await run_in_threadpool(conditions_compared, person, wanted, self._library))
-
-    async def norms(self, request: Request) -> Response:
-        """Make the library's norms from the results of the chosen people."""
-        from kinertia.cli.web.person_page import make_norms
-
-        names = dict.fromkeys(value for key, value in await pairs(request) if key == "person")
-        chosen = self._fitted(names)
-        if not chosen:
-            raise KinertiaError("choose the controls: people without pathology who have results")
-        await run_in_threadpool(make_norms, chosen, self._library)
-        return to(request, "")
 
     async def measures_sheet(self, request: Request) -> Response:
         """Serve the empty sheet of girths and lengths that `kinertia init --measures` writes, to be saved."""
@@ -347,24 +286,12 @@ class _Actions:
             raise HTTPException(404, "no such action")
         return kind
 
-    def _chosen(self, request: Request) -> list[PersonFolder]:
-        return self._fitted(dict.fromkeys(request.query_params.getlist("person")))
-
-    def _fitted(self, names: Iterable[str]) -> list[PersonFolder]:
-        people = [self._library.person(name) for name in names]
-        return [person for person in people if person is not None and person.fitted]
-
     def _checked(self, request: Request, person: PersonFolder) -> Response:
         person.note(saved=True)
         if trouble(person):
             return to(request, "people", person.name)
         self._jobs.add(person, "check")
         return to(request, "people", person.name, section=_SECTIONS["check"])
-
-
-def _result(text: str) -> HTMLResponse:
-    """Serve a page of results, with its own scripts, in isolation."""
-    return HTMLResponse(text, headers={"content-security-policy": RESULT_POLICY})
 
 
 def _recognised(person: PersonFolder) -> None:
@@ -374,13 +301,6 @@ def _recognised(person: PersonFolder) -> None:
         person.note(draft="")
     except KinertiaError as error:
         person.note(draft=str(error))
-
-
-def _copied(person: PersonFolder, folder: Path) -> None:
-    """Copy the results to another folder, completely or not at all."""
-    expect_own_folder(folder)
-    with complete_folder(folder, "fit") as work:
-        shutil.copytree(person.results, work, ignore=shutil.ignore_patterns(".*"), dirs_exist_ok=True)
 
 
 async def _not_found(request: Request, error: Exception) -> Response:

@@ -1,4 +1,4 @@
-"""Checks or fits one person in a process of its own: `python -m kinertia.cli.web.worker fit FOLDER`.
+"""Checks, fits or compares conditions of one person in its own process: `python -m kinertia.cli.web.worker fit FOLDER`.
 
 With `prepare` alone it compiles what the first fit on a machine would compile.
 
@@ -9,16 +9,18 @@ JSON: `{"stage": ..., "share": ...}`, and at the end `{"error": ...}` if a file 
 import json
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TextIO
 
 from kinertia.cli.compiling import compile_once
-from kinertia.cli.web.library import OUTCOME, SUBJECT, SUMMARY, PersonFolder
+from kinertia.cli.web.library import NORMS, OUTCOME, SUBJECT, SUMMARY, PersonFolder
 from kinertia.errors import KinertiaError
+from kinertia.findings.remedy import Span
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.subject.provenance import command_line, sha256
 from kinertia.io.subject.reader import read_subject
+from kinertia.io.subject.tables import SubjectFile
 
 Progress = Callable[[str, float], None]
 
@@ -30,10 +32,12 @@ def check(person: PersonFolder, progress: Progress) -> None:
     from kinertia.workflow.check import check_person
     from kinertia.workflow.person import read_person
 
-    checked = check_person(read_person(read_subject(person.subject), progress))
+    wanted = read_subject(person.subject)
+    checked = check_person(read_person(wanted, progress))
+    windows = windows_of(wanted, {one.context.name: one.windows for one in checked.recordings})
     with complete_folder(person.check, "app") as work:
         save_check_page([checked.overview], checked.recordings, (), work)
-        _write(work, {"inputs": person.inputs, **digest(checked.overview)})
+        _write(work, {"inputs": person.inputs, **digest(checked.overview, windows)})
 
 
 def fit(person: PersonFolder, progress: Progress) -> None:
@@ -48,6 +52,7 @@ def fit(person: PersonFolder, progress: Progress) -> None:
     wanted = read_subject(person.subject)
     result = fit_subject(wanted, progress)
     progress("writing the results", 0.0)
+    windows = windows_of(wanted, {one.name: longest_first(one.kinematics.windows_s) for one in result.trials})
     command = command_line(["kinertia", "fit", str(person.subject), "-o", str(person.results)])
     with complete_folder(person.results, "app") as work:
         save_fit(result, work, provenance_of(wanted, command), force=True)
@@ -58,12 +63,41 @@ def fit(person: PersonFolder, progress: Progress) -> None:
             {
                 "inputs": person.inputs,
                 "summary": sha256(work / SUMMARY),
-                **digest(result.overview),
+                **digest(result.overview, windows),
                 "purposes": [one._asdict() for one in words(result).purposes],
                 "ended": ended,
                 "seconds": round(ended - begun, 1),
             },
         )
+
+
+def comparison(person: PersonFolder, progress: Progress, before: str, after: str) -> None:
+    """Run `kinertia compare --conditions` on the results: compare.html, and its sentences for the page."""
+    from kinertia.report.comparison.what_changed import compare
+
+    norms = person.folder.parent / NORMS
+    found = compare(
+        person.results, conditions=(before, after), progress=progress, norms=norms if norms.is_file() else None
+    )
+    outcome = {
+        "summary": sha256(person.results / SUMMARY),
+        "before": before,
+        "after": after,
+        "sentences": found.sentences,
+    }
+    with complete_folder(person.comparison, "app") as work:
+        (work / "compare.html").write_text(found.page(), encoding="utf-8")
+        _write(work, outcome)
+
+
+def windows_of(wanted: SubjectFile, known: Mapping[str, Sequence[Span]]) -> dict[str, Sequence[Span]]:
+    """Return the used parts (s) of each trial of a subject file by its name; none of one that was not read."""
+    return {files.name: known.get(files.name, ()) for files in wanted.trials}
+
+
+def longest_first(spans: Sequence[Span]) -> list[Span]:
+    """Sort parts of a trial (s) by their length."""
+    return sorted(spans, key=lambda span: span[0] - span[1])
 
 
 def _write(folder: Path, outcome: Mapping[str, Any]) -> None:
@@ -75,7 +109,7 @@ def _said(stream: TextIO, **values: object) -> None:
     stream.flush()
 
 
-def main(kind: str, folder: str = "") -> int:
+def main(kind: str, folder: str = "", *conditions: str) -> int:
     """Run the worker; exit status 2 for an error in the person's files or entries."""
     page, sys.stdout = sys.stdout, sys.stderr  # keeps other output off the page's stream
 
@@ -86,7 +120,8 @@ def main(kind: str, folder: str = "") -> int:
         if kind == "prepare":
             compile_once(progress)
         else:
-            {"check": check, "fit": fit}[kind](PersonFolder(Path(folder)), progress)
+            work: Mapping[str, Callable[..., None]] = {"check": check, "fit": fit, "comparison": comparison}
+            work[kind](PersonFolder(Path(folder)), progress, *conditions)
     except KinertiaError as error:
         _said(page, error=str(error))
         return 2

@@ -344,11 +344,12 @@ def belt_speed(context: RecordingContext) -> Iterator[Finding]:
         causes = ("right and left belt interchanged",)
     elif abs(stated[worst] / max(speeds[worst], 1e-9) / _KM_H - 1) < _APART:
         causes = ("a speed in km/h",)
-    yield finding(
-        "T301",
-        context.at(),
-        causes=causes,
-        stated_m_s=Quantity(stated[worst], "m/s"),
-        feet_m_s=Quantity(speeds[worst], "m/s"),
-        foot=Quantity(FOOT_NAMES[worst] if belt.speed_m_s.ndim == 2 else "either"),
-    )
+    two = belt.speed_m_s.ndim == 2
+    evidence = {
+        "stated_m_s": Quantity(stated[worst], "m/s"),
+        "feet_m_s": Quantity(speeds[worst], "m/s"),
+        "foot": Quantity(FOOT_NAMES[worst] if two else "either"),
+    }
+    if not two:
+        evidence["belt_speed_m_s"] = Quantity(speeds[worst], "m/s")
+    yield with_evidence("T301", context.at(), evidence, causes=causes)

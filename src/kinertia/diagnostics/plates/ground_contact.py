@@ -121,7 +121,7 @@ def both_feet(context: RecordingContext) -> Iterator[Finding]:
     plates = context.plates
     if plates is None or context.is_static:
         return
-    for one in context.shared_loads:
+    for one in filter(lambda each: context.uses(each.span_s), context.shared_loads):
         where = context.at(plate=plates.names[one.contact.plate], span_s=one.span_s)
         yield finding("P276", where, share=Quantity(one.share, "1", limit=one.limit))
 
@@ -132,7 +132,7 @@ def plate_edges(context: RecordingContext) -> Iterator[Finding]:
     plates = context.plates
     if plates is None or context.is_static:
         return
-    for one in context.overhangs:
+    for one in filter(lambda each: context.uses(each.span_s), context.overhangs):
         yield finding(
             "P282",
             context.at(plate=plates.names[one.plate], span_s=one.span_s),

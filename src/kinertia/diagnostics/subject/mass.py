@@ -18,7 +18,7 @@ from kinertia.diagnostics.context import PersonContext, odd_ones
 from kinertia.diagnostics.evidence.force_mass import MISSING, MOSTLY, UNMEASURED_S, ForceMass, UnmeasuredSupport
 from kinertia.diagnostics.runner import check
 from kinertia.estimation.prepared import TotalMass
-from kinertia.findings.finding import Finding, Severity, finding
+from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.trial.data import PlateLoads
@@ -45,6 +45,8 @@ _STATED, _STATED_OVER_POUND = "a wrong stated mass", "a stated mass in kg that w
 _LOAD = "a load that was worn or carried and not declared as [[attached]]"
 _SUPPORT = "support that no plate measures, like a handrail, a chair, a walker or a foot beside the plates"
 _PLATES = "gain or zero of the plates"
+_MASS_ACTIONS = ("Correct the mass", "correct the mass", "Give the mass in kg")
+"""Actions with which the stated mass is to be replaced by the plates'."""
 
 
 @dataclass(frozen=True)
@@ -231,8 +233,12 @@ def _contradiction(
 ) -> Iterator[Finding]:
     """Report S111, with the causes that the evidence supports, and the unit that explains it."""
     where, ratio = Where(trial=one.trial), one.mass_kg / total.total_kg
+    stated_kg = context.subject.mass_kg
     if _near(ratio, _POUND):
-        yield finding("S112", where, ratio=Quantity(ratio, "1"))
+        pounds = {"ratio": Quantity(ratio, "1")}
+        if stated_kg is not None:
+            pounds["mass_kg"] = Quantity(stated_kg * _POUND, "kg")
+        yield with_evidence("S112", where, pounds)
     percent = {"% of body weight": 100.0 / (total.body_kg * GRAVITY_M_S2)}
     for unit, factor in (_FORCE_UNITS | percent).items():
         if _near(ratio, factor):
@@ -251,6 +257,8 @@ def _contradiction(
         "method": Quantity(f"marker-based centre of mass over {one.over}"),
         "action": Quantity(action),
     }
+    if stated_kg is not None and any(words in action for words in _MASS_ACTIONS):
+        evidence["mass_kg"] = Quantity(stated_kg + one.mass_kg - total.total_kg, "kg", sd=one.sd_kg)
     for standing in [each for each in witnesses if each.standing][:1]:
         evidence["static_kg"] = Quantity(standing.mass_kg, "kg", sd=standing.sd_kg)
     if len(by_plate) > 1:

@@ -4,8 +4,9 @@ import difflib
 import json
 import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from kinertia.errors import FileError, KinertiaError, MarkerSetError
@@ -42,7 +43,13 @@ def init_subject(folder: str | Path, nearby: bool = True) -> str:
     return init_files(folder, nearby, marker_set=False)[SUBJECT]
 
 
-def init_files(folder: str | Path, nearby: bool = True, marker_set: bool = True) -> dict[str, str]:
+def init_files(
+    folder: str | Path,
+    nearby: bool = True,
+    marker_set: bool = True,
+    stated: Mapping[str, object] = MappingProxyType({}),
+    conditions: Mapping[str, str] = MappingProxyType({}),
+) -> dict[str, str]:
     """Draft a subject file for the recordings in a folder (not its subfolders), and a marker set where none fits the
     static trial; writes nothing.
 
@@ -53,6 +60,13 @@ def init_files(folder: str | Path, nearby: bool = True, marker_set: bool = True)
     girths and lengths is used, but not with a model, whose segments are defined differently; of several sheets one must
     be chosen. Unknown entries, and trials without forces, are commented lines marked FILL IN. Recordings whose names
     begin like another static trial's are left out and listed in a comment.
+
+    Args:
+        folder: the folder.
+        nearby: whether forces are looked for in folders in it and beside it, too.
+        marker_set: whether a marker set is drafted where no preset fits.
+        stated: entries of `[subject]` that the user gives; they precede those of files.
+        conditions: condition of trials by the file's name without its ending.
 
     Raises:
         FileError: no such folder, or no file of markers in it.
@@ -71,7 +85,7 @@ def init_files(folder: str | Path, nearby: bool = True, marker_set: bool = True)
     text = [f"# Drafted from the files in {folder.name}: complete the lines marked FILL IN, check the rest."]
     if others:
         text += [f"# Left out (another subject's, another static trial, or also there as C3D): {', '.join(others)}."]
-    text += ["", "[subject]", *_subject_lines([file for file in (static, *trials) if file in c3d])]
+    text += ["", "[subject]", *_subject_lines([file for file in (static, *trials) if file in c3d], stated)]
     wanted = marker_set and not by_model and not (folder / MARKER_SET).exists()
     preset, draft = _marker_set(static, trials) if wanted else ("", None)
     text += ["", "[model]"]
@@ -82,7 +96,7 @@ def init_files(folder: str | Path, nearby: bool = True, marker_set: bool = True)
     if not by_model:
         offered = models or (_models_near(folder) if nearby else [])
         text += [f"# {_entry(Model, 'osim', _relative(model, folder))}" for model in offered]
-    text += _trial_lines(folder, files, trials, nearby)
+    text += _trial_lines(folder, files, trials, nearby, conditions)
     sheets = [] if by_model else [file.name for file in files if is_measures_sheet(file)]
     if sheets:
         text += ["", "[prior]", _entry(PriorFiles, "measures", sheets[0] if len(sheets) == 1 else None, sheets[0])]
@@ -109,12 +123,14 @@ def _markers_line(is_here: bool, preset: str, draft: MarkerSetDraft | None) -> s
     if is_here or (draft is not None and not draft.against):
         return _entry(Model, "markers", MARKER_SET)
     if draft is None:
-        return "# " + _entry(Model, "markers", preset or "plug-in-gait")
+        return "# " + _entry(Model, "markers", preset or MARKER_SET)
     return f"# {_entry(Model, 'markers', MARKER_SET)}; {NOT_USED}{'; '.join(draft.against)}. Correct it first"
 
 
-def _trial_lines(folder: Path, files: Sequence[Path], trials: Sequence[Path], nearby: bool) -> list[str]:
-    """Return a table per trial with the forces and loads of the most similar names."""
+def _trial_lines(
+    folder: Path, files: Sequence[Path], trials: Sequence[Path], nearby: bool, conditions: Mapping[str, str]
+) -> list[str]:
+    """Return a table per trial with its condition, and the forces and loads of the most similar names."""
     alone = [trial for trial in trials if not _brings_forces(trial)]
     forces, loads = (
         _here_or_near(folder, files, holds) if nearby else [file for file in files if holds(file)]
@@ -124,6 +140,8 @@ def _trial_lines(folder: Path, files: Sequence[Path], trials: Sequence[Path], ne
     text = []
     for trial in trials:
         text += ["", "[[trial]]", _entry(TrialFiles, "markers", trial.name)]
+        if condition := conditions.get(trial.stem):
+            text.append(_entry(TrialFiles, "condition", condition))
         if trial in chosen:
             text += [_entry(TrialFiles, "forces", _relative(chosen[trial], folder), note=" (matched by name)")]
             for file in matched_by_name([chosen[trial]], loads).values():
@@ -187,14 +205,16 @@ def _entry(table: type[Table], key: str, value: object, example: object = None, 
     return entry_line(table, key, value, note)
 
 
-def _subject_lines(c3d: Sequence[Path]) -> list[str]:
+def _subject_lines(c3d: Sequence[Path], stated: Mapping[str, object]) -> list[str]:
     recordings = [recording for recording in map(_recording, c3d) if recording]
-    lines = [_entry(Subject, "sex", None, "female")]
+    lines = [_entry(Subject, "sex", stated.get("sex"), "female")]
     for key, example in (("mass_kg", 70.0), ("height_m", 1.7)):
         filed = next((getattr(recording, key) for recording in recordings if getattr(recording, key)), None)
         value = filed and float(f"{filed:.6g}")  # 32.1, not the 32.099998 of a C3D's single precision
-        lines.append(_entry(Subject, key, value, example, " (from C3D)" if value else ""))
-    return lines
+        from_file = bool(value) and key not in stated
+        lines.append(_entry(Subject, key, stated.get(key, value), example, " (from C3D)" if from_file else ""))
+    age = entry_line(Subject, "age_years", stated.get("age_years", 30))
+    return [*lines, age if "age_years" in stated else f"# {age}"]
 
 
 def _static_and_trials(captures: Sequence[Path]) -> tuple[Path | None, list[Path]]:

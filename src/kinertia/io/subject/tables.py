@@ -156,6 +156,9 @@ class TrialFiles(Table):
         description='whose foot is on a plate, where the nearest is wrong: `[{ plate = "plate 1", foot = "right", '
         'window_s = [0.4, 1.1] }]`; foot "right", "left" or "none", window_s may be left out',
     )
+    leave_out: tuple[str, ...] = Field(
+        default=(), strict=False, description='markers that are not used in this trial: `["LTHI"]`'
+    )
     use: TrialUse = Field(
         default="all",
         description='"kinematics": only its markers are used, for joint centres, joint axes and marker positions',

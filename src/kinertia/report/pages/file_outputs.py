@@ -179,6 +179,7 @@ def _row(one: OutputComparison) -> dict[str, Any]:
     digits = 1 if one.kind == "ANGLES" else 2
     outside = one.outside
     return {
+        "kind": one.kind,
         "quantity": f"{one.quantity} ({one.unit})",
         "side": SIDES[one.side][0],
         "rms": f"{one.rms:.{digits}f}",

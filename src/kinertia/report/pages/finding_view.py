@@ -4,7 +4,7 @@ The report, check.html and the page in the browser share one view, so that they 
 """
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -25,6 +25,7 @@ from kinertia.findings.overview import (
     reported,
 )
 from kinertia.findings.quantity import Quantity, Where
+from kinertia.findings.remedy import Span, remedies
 from kinertia.findings.rule import Rule, matching, rule
 
 LOOKS = {USE: "info", WITH_CARE: "warning", DO_NOT_USE: "error"}
@@ -119,9 +120,10 @@ class FindingView:
 
     @cached_property
     def ignored(self) -> str:
-        """Codes that the user ignores, and how often they were found; empty without any."""
-        codes = [one.code for one in self.findings if one.status == "ignored" and one.muted_by is None]
-        return ", ".join(f"{code} ({codes.count(code)})" for code in dict.fromkeys(codes))
+        """Codes that the user ignores, how often they were found, and the reason; empty without any."""
+        found = [one for one in self.findings if one.status == "ignored" and one.muted_by is None]
+        codes, reasons = [one.code for one in found], {one.code: one.reason for one in found}
+        return ", ".join(f"{code} ({codes.count(code)}{f': {why}' if why else ''})" for code, why in reasons.items())
 
     @cached_property
     def steps(self) -> list[Card]:
@@ -204,22 +206,26 @@ def lines(findings: Iterable[Finding], least: Severity = Severity.CORRECTED) -> 
     return [group.line for group in grouped(reported(findings, least))]
 
 
-def digest(overview: Overview) -> dict[str, Any]:
+def digest(overview: Overview, windows: Mapping[str, Sequence[Span]]) -> dict[str, Any]:
     """Return verdict, remedies that come first and findings for the page in the browser, without assumptions.
 
     Equal findings have one entry.
+
+    Args:
+        overview: summary of the findings.
+        windows: used parts (s) of each trial by its name, the longest first.
     """
     shown_ = [one for one in overview.findings if one.severity > Severity.INFO and one.muted_by is None]
     groups = grouped(in_order(one for one in shown_ if one.status != "ignored"))
     return {
         "verdict": overview.verdict,
         "line": overview.line,
-        "steps": [_in_short(card.group) for card in FindingView([overview]).steps],
-        "findings": [_in_short(group) for group in groups],
+        "steps": [_in_short(card.group, windows) for card in FindingView([overview]).steps],
+        "findings": [_in_short(group, windows) for group in groups],
     }
 
 
-def _in_short(group: Group) -> dict[str, str]:
+def _in_short(group: Group, windows: Mapping[str, Sequence[Span]]) -> dict[str, Any]:
     first = group.first
     return {
         "code": first.code,
@@ -228,4 +234,6 @@ def _in_short(group: Group) -> dict[str, str]:
         "place": first.place,
         "message": group.message,
         "remedy": first.remedy,
+        "reason": first.reason,
+        "settings": [one.to_dict() for one in remedies(group.findings, windows) if first.is_open],
     }

@@ -197,6 +197,9 @@
   const address = document.querySelector("[data-address]")?.dataset.address;
   if (address) history.replaceState(null, "", address + location.hash);
 
+  // without an outcome the section of results says what ended
+  if (location.hash === "#outcome" && !document.getElementById("outcome")) document.getElementById("results")?.scrollIntoView();
+
   // asks how far it is; when it is done the page is asked for again
   class Working {
     constructor(root) {
@@ -219,8 +222,7 @@
 
     // to another address, since loading the same one again could repeat a form
     again() {
-      const place = this.root.dataset.kind === "fit" ? "#results" : "#check";
-      location.replace(`${address}?again${place}`);
+      location.replace(`${address}?again${this.root.dataset.kind === "comparison" ? "#comparison" : "#outcome"}`);
     }
 
     show(job) {
