@@ -92,7 +92,7 @@ class Information:
         for _ in range(_ROUNDS):
             result[places, places] = gaussian.precision
             covariance = np.linalg.inv(rest + result)[places, places]
-            gaussian = gaussian.updated(priors, np.zeros(len(priors.own)), covariance)
+            gaussian = gaussian.updated(priors, np.zeros(len(priors.individual)), covariance)
         result[places, places] = gaussian.precision
         return result
 

@@ -69,8 +69,8 @@ class _Pair(NamedTuple):
     """Change (m) of the distance of two markers, its limit `limit_m`, and the part that joins them."""
 
     change_m: float
-    one: str
-    other: str
+    first: str
+    second: str
     joined: str
     limit_m: float
 
@@ -97,13 +97,13 @@ def _not_rigid(context: RecordingContext, markers: Markers, marker_set: MarkerSe
     in_any_case = float(np.hypot(_JOINT_M, noise_m))
     marks = {label for name, labels in marker_set.landmarks.items() if "wand" not in name for label in labels}
     while far:
-        count = Counter(label for pair in far for label in (pair.one, pair.other))
+        count = Counter(label for pair in far for label in (pair.first, pair.second))
         worst = max(far)
         # a marker that is no landmark is more likely wrong, and one far from several others
-        odd = max((worst.one, worst.other), key=lambda label: (label not in marks, count[label]))
-        own = [pair for pair in far if odd in (pair.one, pair.other)]
+        odd = max((worst.first, worst.second), key=lambda label: (label not in marks, count[label]))
+        own = [pair for pair in far if odd in (pair.first, pair.second)]
         far = [pair for pair in far if pair not in own]
-        mates = dict.fromkeys(label for pair in sorted(own, reverse=True) for label in (pair.one, pair.other))
+        mates = dict.fromkeys(label for pair in sorted(own, reverse=True) for label in (pair.first, pair.second))
         involved = (odd, *(label for label in mates if label != odd))
         if worst.change_m < in_any_case and not any(_elsewhere(markers, marker_set, one) for one in involved):
             continue

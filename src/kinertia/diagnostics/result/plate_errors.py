@@ -142,7 +142,7 @@ def position_deviations(shown: InstrumentInformation, prior: InstrumentPrior, ax
         axis: "x" or "z".
     """
     priors, size = prior.of_unknowns(shown.plates), len(PLATE_UNKNOWNS)
-    own = np.array([one.faulty_sd for one in priors.own])
+    own = np.array([one.faulty_sd for one in priors.individual])
     common = np.array([one.faulty_sd for one, _ in priors.common])
     own[size * len(shown.plates) + list(FLOOR_UNKNOWNS).index(axis)] = _FIXED_M
     along = [size * plate + list(PLATE_UNKNOWNS).index(axis) for plate in range(len(shown.plates))]
@@ -222,7 +222,7 @@ def smallest_detectable_of_one(shown: InstrumentInformation, prior: InstrumentPr
 
 
 def _smallest(shown: InstrumentInformation, prior: InstrumentPrior, place: int) -> float:
-    unknowns = prior.of_unknowns(shown.plates).own
+    unknowns = prior.of_unknowns(shown.plates).individual
     precision = np.array([0.0 if k == place else 1.0 / one.sd**2 for k, one in enumerate(unknowns)])
     information = shown.information + prior.of_session(shown.plates).information + np.diag(precision)
     if not information[place, place] > 0.0:

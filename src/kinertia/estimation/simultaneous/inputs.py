@@ -53,7 +53,7 @@ class Unknowns:
         cls, name: str, unit: str, prior: ErrorPriors, *, of_laboratory: bool = False, in_models: bool = True
     ) -> Self:
         """Define errors of the ground reactions, all zero at the start."""
-        start = np.zeros(len(prior.own))
+        start = np.zeros(len(prior.individual))
         return cls(name=name, unit=unit, start=start, prior=prior, of_laboratory=of_laboratory, in_models=in_models)
 
     @property

@@ -84,7 +84,7 @@ class ErrorPriors:
     """Priors of k errors, each the sum of a part of its own and of parts in common with others.
 
     Attributes:
-        own: prior of each one's own part.
+        individual: prior of each one's own part.
         common: priors of common parts, each with the indices of the errors that share it.
 
     >>> plate = FaultMixture(0.001, 0.015, 0.2)
@@ -93,7 +93,7 @@ class ErrorPriors:
            [4.6e-05, 9.2e-05]])
     """
 
-    own: tuple[FaultMixture, ...]
+    individual: tuple[FaultMixture, ...]
     common: tuple[tuple[FaultMixture, tuple[int, ...]], ...] = ()
 
     @classmethod
@@ -102,21 +102,21 @@ class ErrorPriors:
         common, before = [], 0
         for each in every:
             common += [(prior, tuple(before + one for one in members)) for prior, members in each.common]
-            before += len(each.own)
-        return cls(tuple(prior for each in every for prior in each.own), tuple(common))
+            before += len(each.individual)
+        return cls(tuple(prior for each in every for prior in each.individual), tuple(common))
 
     @cached_property
     def parts(self) -> tuple[FaultMixture, ...]:
         """Priors of all parts, which are independent: (k + c)."""
-        return (*self.own, *(prior for prior, _ in self.common))
+        return (*self.individual, *(prior for prior, _ in self.common))
 
     @cached_property
     def of_parts(self) -> np.ndarray:
         """Matrix (k, k + c) from the parts to the errors."""
-        shared = np.zeros((len(self.own), len(self.common)))
+        shared = np.zeros((len(self.individual), len(self.common)))
         for column, (_, members) in zip(shared.T, self.common, strict=True):
             column[list(members)] = 1.0
-        return np.hstack([np.eye(len(self.own)), shared])
+        return np.hstack([np.eye(len(self.individual)), shared])
 
     @cached_property
     def covariance(self) -> np.ndarray:
@@ -142,7 +142,7 @@ class GaussianPrior:
     @classmethod
     def of(cls, priors: ErrorPriors) -> GaussianPrior:
         """Return mean and covariance of the priors, without data."""
-        return cls(np.linalg.inv(priors.covariance), np.zeros(len(priors.own)))
+        return cls(np.linalg.inv(priors.covariance), np.zeros(len(priors.individual)))
 
     def cost(self, values: np.ndarray) -> float:
         """Return half the squared distance of values (k,) from the mean over its covariance, up to a constant."""
@@ -194,7 +194,7 @@ def fault_probabilities(priors: ErrorPriors, data: np.ndarray, rhs: np.ndarray) 
     log_weight = np.concatenate([ways.log_weight for ways in every])
     weight = np.exp(log_weight - log_weight.max())
     off = np.concatenate([ways.off for ways in every])
-    result: np.ndarray = (weight @ off / weight.sum())[: len(priors.own)]
+    result: np.ndarray = (weight @ off / weight.sum())[: len(priors.individual)]
     return result
 
 

@@ -75,7 +75,7 @@ def test_a_stated_synchronisation_holds_in_every_trial(clock_sd_ms):
     several = small_problem(3)
     calibration = replace(several.calibration, instruments=prior)
     unknowns = InstrumentErrors.unknowns(replace(several.given, calibration=calibration))
-    priors = {one.name: one.prior.own for one in unknowns}
+    priors = {one.name: one.prior.individual for one in unknowns}
     (clock,), delays = priors[CLOCK], priors[TRIAL_DELAYS]
     assert len(delays) == 3
     assert clock.nominal_sd == (0.0003 if clock_sd_ms is None else pytest.approx(clock_sd_ms / 1e3))

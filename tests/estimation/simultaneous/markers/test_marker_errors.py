@@ -69,7 +69,7 @@ def test_information_is_the_inverse_of_the_covariance_of_every_run(process, gaps
     seen = np.ones((n, 1), dtype=bool)
     seen[gaps] = False
     information = ErrorInformation.of(seen, np.array([sd]), process)
-    dense = np.diag(information.own[:, 0])
+    dense = np.diag(information.same[:, 0])
     for later, part in ((1, information.next), (2, information.second)):
         dense += np.diag(part[:, 0], later) + np.diag(part[:, 0], -later)
     expected = np.zeros((n, n))

@@ -62,11 +62,11 @@ def test_only_contacts_of_the_incomplete_plate_have_parts_and_only_in_measured_f
 
 def test_gain_of_an_incomplete_plate_stays_nominal(problem):
     layout, complete = problem.layout, small_problem().layout
-    sds = [[one.sd for one in each.error_priors.own] for each in (layout, complete)]
+    sds = [[one.sd for one in each.error_priors.individual] for each in (layout, complete)]
     for name, at in ((PLATES, 5 + 2), (GAINS, 1)):
         own, other = (each[layout[name].start - layout.errors.start + at] for each in sds)
         assert own <= other
-        assert layout.error_priors.own[layout[name].start - layout.errors.start + at].fault_probability == 0.0
+        assert layout.error_priors.individual[layout[name].start - layout.errors.start + at].fault_probability == 0.0
 
 
 def test_derivatives_by_missing_loads_are_those_of_the_cost(problem):

@@ -313,6 +313,6 @@ def _session_says_otherwise(own: InstrumentInformation, prior: InstrumentPrior) 
 
 def _alone(shown: InstrumentInformation, prior: InstrumentPrior) -> tuple[np.ndarray, np.ndarray]:
     """Return values (k,) and standard deviations (k,) from some trials alone, if any instrument may be faulty."""
-    faulty = np.array([one.faulty_sd for one in prior.of_unknowns(shown.plates).own])
+    faulty = np.array([one.faulty_sd for one in prior.of_unknowns(shown.plates).individual])
     covariance = np.linalg.inv(shown.information + np.diag(faulty**-2.0))
     return covariance @ shown.rhs, np.sqrt(np.diag(covariance))

@@ -113,12 +113,12 @@ class ErrorInformation:
     """Inverse covariance of the errors of m markers over n frames; the three axes are independent and alike.
 
     Attributes:
-        own: (n, m) of each frame with itself, 1 / m^2; zero where the marker is not seen.
+        same: (n, m) of each frame with itself, 1 / m^2; zero where the marker is not seen.
         next: (n - 1, m) of each frame with the one after it.
         second: (n - 2, m) of each frame with the second after it.
     """
 
-    own: np.ndarray
+    same: np.ndarray
     next: np.ndarray
     second: np.ndarray
 
@@ -159,7 +159,7 @@ class SeenMarkers(NamedTuple):
         local: (n, m, 3) m, the markers in the frames of these axes, displaced with the skin.
         turned: (m, 3, 3) the segments' axes in these frames.
         measured: (n, m, 3) m; NaN where not seen.
-        own, next, second: as in `ErrorInformation`.
+        same, next, second: as in `ErrorInformation`.
         patterns, first, last: as in `SkinPatterns`.
         columns: (m,) index at which the coefficients of each marker begin among the columns of S.
     """
@@ -172,7 +172,7 @@ class SeenMarkers(NamedTuple):
     local: Float3
     turned: Float3
     measured: Float3
-    own: Float2
+    same: Float2
     next: Float2
     second: Float2
     patterns: Float2
@@ -230,7 +230,7 @@ def seen_markers(
         local + patterns.displaced(along_axes.ravel()),
         np.ascontiguousarray(turned),
         np.ascontiguousarray(measured),
-        information.own,
+        information.same,
         information.next,
         information.second,
         np.ascontiguousarray(patterns.values),
@@ -251,7 +251,7 @@ def place_markers(markers: SeenMarkers, k: int, placed: PlacedMarkers) -> None:
         j = markers.last_axis[m]
         place_marker(rotation[j], translation[j], markers.local[k, m], places[m])
         for r in range(3):
-            errors[m, r] = markers.measured[k, m, r] - places[m, r] if markers.own[k, m] > 0.0 else 0.0
+            errors[m, r] = markers.measured[k, m, r] - places[m, r] if markers.same[k, m] > 0.0 else 0.0
             for i in range(3):
                 turned[m, r, i] = 0.0
                 for h in range(3):
@@ -272,7 +272,7 @@ def add_gradient(
 
     Arguments are as in `marker_terms`.
     """
-    n, m = markers.own.shape
+    n, m = markers.same.shape
     start, stop = own
     c, a = rhs.shape[1], len(markers.column)
     placed = PlacedMarkers(np.empty((5, a, 6)), np.empty((5, m, 3)), np.empty((5, m, 3)), np.empty((5, m, 3, 3)))
@@ -307,11 +307,11 @@ def add_gradient(
 @part
 def _pulls(markers: SeenMarkers, k: int, placed: PlacedMarkers, pull: np.ndarray) -> float:
     """Write W r (m, 3) of frame k, and return its r^T W r."""
-    n, m = markers.own.shape
+    n, m = markers.same.shape
     cost, here = 0.0, placed.errors[k % 5]
     for i in range(m):
         for r in range(3):
-            value = markers.own[k, i] * here[i, r]
+            value = markers.same[k, i] * here[i, r]
             if k >= 1:
                 value += markers.next[k - 1, i] * placed.errors[(k - 1) % 5, i, r]
             if k >= 2:

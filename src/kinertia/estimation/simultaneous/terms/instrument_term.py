@@ -62,9 +62,9 @@ class InstrumentErrors(LoadTerm):
 
         return (
             Unknowns.errors(
-                PLATES, "m, 1, N m/N or rad", ErrorPriors(shared.own[:-1], shared.common), of_laboratory=True
+                PLATES, "m, 1, N m/N or rad", ErrorPriors(shared.individual[:-1], shared.common), of_laboratory=True
             ),
-            Unknowns.errors(CLOCK, "s", ErrorPriors(shared.own[-1:]), of_laboratory=True),
+            Unknowns.errors(CLOCK, "s", ErrorPriors(shared.individual[-1:]), of_laboratory=True),
             Unknowns.errors(TRIAL_DELAYS, "s", of_trials(known.trial_delay_s, count if delay_unknowns else 0)),
             Unknowns.errors(ZEROS, "N", of_trials(known.zero_offset_n, len(ZERO_UNKNOWNS) * plates)),
             Unknowns.errors(GAINS, "1", ErrorPriors(gains)),
@@ -104,7 +104,7 @@ class InstrumentErrors(LoadTerm):
 
     def profiled(self) -> list[int]:
         """Return the delays of a single trial with forces, if it is undetermined whether they are delayed."""
-        places, priors = self.delay_unknowns(0), self.layout.error_priors.own
+        places, priors = self.delay_unknowns(0), self.layout.error_priors.individual
         own = [priors[at - self.layout.errors.start] for at in places]
         uncertain = any(0.0 < prior.fault_probability < 1.0 for prior in own)
         return places if uncertain and sum(map(bool, self._own)) < 2 else []
@@ -207,7 +207,7 @@ class InstrumentErrors(LoadTerm):
         more = (0, len(mean) - size)
         before = ((prior.precision, prior.pull), (np.pad(session.information, more), np.pad(session.rhs, more)))
         shown = InstrumentInformation.of_posterior(self.given.plates, mean, covariance, before)
-        own = priors.own[size:]
+        own = priors.individual[size:]
         if len(self.given.trials) > 1:
             faulty = fault_probabilities(priors, shown.information, shown.rhs)[size:].tolist()
             own = tuple(replace(one, fault_probability=share) for one, share in zip(own, faulty, strict=True))

@@ -104,7 +104,7 @@ def _add(
 
     `first` and `values` are those of the motion basis.
     """
-    n, m = markers.own.shape
+    n, m = markers.same.shape
     start, stop = own
     c, a, s = band.shape[2], len(markers.column), len(static.rhs)
     reach, pairs = _reach(markers, c, still), _pairs(markers.tree.parent)
@@ -158,7 +158,7 @@ def _frame(
     sums, forces, met = np.zeros((a, 16)), np.zeros((a, 6)), np.empty((a, 6))
     for i in range(m):
         at = placed.places[here, i]
-        add_marker(markers.own[k, i], at, at, sums[markers.last_axis[i]])
+        add_marker(markers.same[k, i], at, at, sums[markers.last_axis[i]])
         add_force(pull[i], at, forces[markers.last_axis[i]])
         for r in range(3):
             static.cost[0] += placed.errors[here, i, r] * pull[i, r]
@@ -194,9 +194,9 @@ def _informed(
     The axes come first as they are, then multiplied by each pattern of the skin.
     """
     there = k + offset
-    if there < 0 or there >= len(markers.own):
+    if there < 0 or there >= len(markers.same):
         return
-    weights = markers.own[k]
+    weights = markers.same[k]
     if abs(offset) == 1:
         weights = markers.next[min(k, there)]
     elif offset != 0:

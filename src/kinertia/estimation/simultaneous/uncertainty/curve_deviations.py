@@ -228,13 +228,13 @@ class _Interval(NamedTuple):
     """Rows in the frames of one knot interval (`write_variances`).
 
     Attributes:
-        own: the frames, among those of `_Seen`.
+        frames: slice of the frames, among those of `_Seen`.
         moment, shaken, by_errors: (n r, ...) changes of the rows with the static unknowns, and with the errors.
         covariance, carried: of the active splines, as in `MotionSpread.active`.
         values: (3, n, 6) of these splines.
     """
 
-    own: slice
+    frames: slice
     moment: np.ndarray
     shaken: np.ndarray
     by_errors: np.ndarray
@@ -271,7 +271,7 @@ def _write_variances(spread: MotionSpread, seen: _Seen, root: np.ndarray, into: 
     sums = np.empty((4, *seen.by.static.shape[:2]))
     for one in _intervals(spread, seen, root):
         errors = (one.shaken, one.by_errors, one.covariance, one.values, seen.shares)
-        write_variances(one.moment, one.carried, *errors, sums[:, one.own])
+        write_variances(one.moment, one.carried, *errors, sums[:, one.frames])
     place, rate, force, both = sums
     value = seen.by.value
     into.coordinates[rows], into.moments[rows] = place, force
@@ -284,5 +284,5 @@ def _joint_variances(spread: MotionSpread, seen: _Seen, root: np.ndarray) -> np.
     for one in _intervals(spread, seen, root) if result.shape[1] else ():
         variance = np.einsum("ij,ij->i", one.moment, one.moment)
         variance += np.einsum("ij,ij->i", one.by_errors, one.shaken)
-        result[one.own] += variance.reshape(-1, result.shape[1])
+        result[one.frames] += variance.reshape(-1, result.shape[1])
     return result

@@ -97,7 +97,7 @@ class _Shown:
         """
         layout, given = self.problem.layout, self.problem.given
         instruments, parts = self.problem.term(InstrumentErrors), self.problem.term(MissingLoads).parts
-        own, first = list(layout.error_priors.own), layout.errors.start
+        own, first = list(layout.error_priors.individual), layout.errors.start
         for k, trial in enumerate(given.trials):
             for name, at in zip(trial.ground.plates, instruments.gains_of(k), strict=True):
                 if name in suspected:

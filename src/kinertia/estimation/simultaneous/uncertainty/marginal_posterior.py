@@ -162,7 +162,7 @@ class CostProfile:
         """
         problem, here = model.problem, model.here
         late, first = np.array(problem.profiled(), dtype=int), problem.layout.errors.start
-        priors = [problem.layout.error_priors.own[k] for k in late - first]
+        priors = [problem.layout.error_priors.individual[k] for k in late - first]
         unchanged = cls(here, instruments, point.static)
         if not len(late):
             return unchanged
