@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from command_line import run as command
 from kinertia.cohort import paired
 from kinertia.cohort.paired import Pair, PersonChanges, changes_of, changes_sentence, mean_parts, pairs_of
 from kinertia.cohort.people import people_of
@@ -141,3 +142,18 @@ def test_tables_have_a_row_per_outcome_and_the_means(fitted):
     write_tables(cohort, [], False)
     assert len(pd.read_csv(cohort / "changes.csv")) == 0, "not those of an earlier run"
     assert not list(mean_parts((PersonChanges("Clara", remarks="none"),), BOTH))
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--learn", "--conditions", "before", "after"), "--learn and --conditions"),
+        (("--learn",), "--learn does not know sessions"),
+        (("--conditions", "shod", "barefoot"), "nobody has sessions or conditions shod and barefoot"),
+    ],
+)
+def test_what_cannot_be_compared_is_refused_before_anybody_is_fitted(study, tmp_path, options, said):
+    outcome = command("cohort", study, "-o", tmp_path / "out", *options)
+    assert outcome.status == 2
+    assert said in " ".join(outcome.err.split())
+    assert not (tmp_path / "out").exists()
