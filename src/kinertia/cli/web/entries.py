@@ -16,8 +16,7 @@ from kinertia.cli.web.file_table import (
     within_folder,
 )
 from kinertia.cli.web.library import SUBJECT, PersonFolder
-from kinertia.cli.web.rows import Field, choices_of, with_rows
-from kinertia.cli.web.trial_fields import with_trial_fields
+from kinertia.cli.web.rows import Field, choices_of, with_rows, with_trial_fields
 from kinertia.errors import KinertiaError, SettingsError
 from kinertia.io.marker_set_file import preset_names
 from kinertia.io.output_folder import write_then_rename

@@ -17,8 +17,8 @@ from kinertia.cli.web.jobs import KINDS, Job, Jobs
 from kinertia.cli.web.library import LIMITS, Library, PersonFolder
 from kinertia.cli.web.remedies import Button, applied
 from kinertia.cli.web.responses import page, time_left
+from kinertia.cli.web.rows import CONDITION, END, START, conditions, trial_fields
 from kinertia.cli.web.rows import rows as rows_of
-from kinertia.cli.web.trial_fields import CONDITION, END, START, conditions, trial_fields
 from kinertia.errors import KinertiaError
 from kinertia.estimation.result.mean_cycles import Control, band_columns
 from kinertia.io.norms_file import read_norms

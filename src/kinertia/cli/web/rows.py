@@ -1,10 +1,10 @@
-"""Shows repeated entries of a subject file (measured segments, attached items) as rows of a form.
+"""Shows repeated entries of a subject file, conditions of trials and parts of recordings as rows of a form.
 
 Rows are written as typed, numbers as numbers; `read_subject` reports what is wrong with them.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args, get_origin
 
@@ -38,6 +38,9 @@ _LONGEST_NUMBER = 4
 _THREE = ("com_mm", "size_mm")
 _BETWEEN = re.compile(r"\s*;\s*|,?\s+")
 _DECIMAL_COMMA = re.compile(r"(?<=\d),(?=\d)")
+CONDITION, START, END = "condition:", "start:", "end:"
+"""Prefixes of the form's fields for the condition of a trial, and the part of a recording; the file's name follows."""
+_WINDOW = "window_s"
 
 
 @dataclass(frozen=True)
@@ -205,3 +208,89 @@ def _number(text: str) -> object:
         return number_of(text)
     except ValueError:
         return _DECIMAL_COMMA.sub(".", text)
+
+
+@dataclass(frozen=True)
+class TrialFields:
+    """What the form shows of one recording beside its use: condition, start and end of the part used (s), as typed."""
+
+    condition: str = ""
+    start: str = ""
+    end: str = ""
+
+
+def trial_fields(content: Content, files: Iterable[str], typed: Mapping[str, str]) -> dict[str, TrialFields]:
+    """Return the fields of each file; typed values precede written ones."""
+    written = {file: _written_trial(one) for file, one in _recordings(content)}
+    shown = {}
+    for file in files:
+        known = written.get(file, TrialFields())
+        shown[file] = TrialFields(
+            typed.get(CONDITION + file, known.condition),
+            typed.get(START + file, known.start),
+            typed.get(END + file, known.end),
+        )
+    return shown
+
+
+def conditions(content: Content) -> list[str]:
+    """Return the stated conditions, each once."""
+    return list(dict.fromkeys(str(one["condition"]) for _, one in _recordings(content) if one.get("condition")))
+
+
+def with_trial_fields(content: Content, form: Mapping[str, str]) -> Content:
+    """Return the entries with conditions and parts of the form; empty fields remove them.
+
+    Raises:
+        SettingsError: a part lacks its start or its end, or one is no number.
+    """
+    changed = dict(content)
+    trials, model = content.get("trial"), content.get("model")
+    if isinstance(trials, list):
+        changed["trial"] = [
+            _changed(one, str(one.get("markers")), form) if isinstance(one, Mapping) else one for one in trials
+        ]
+    if isinstance(model, Mapping) and "static" in model:
+        changed["model"] = _changed(model, str(model["static"]), form)
+    return changed
+
+
+def _recordings(content: Content) -> list[tuple[str, Mapping[str, Any]]]:
+    trials, model = content.get("trial"), content.get("model")
+    known = [one for one in trials if isinstance(one, Mapping)] if isinstance(trials, list) else []
+    static = [(str(model["static"]), model)] if isinstance(model, Mapping) and "static" in model else []
+    return [*static, *((str(one.get("markers", "")), one) for one in known)]
+
+
+def _written_trial(one: Mapping[str, Any]) -> TrialFields:
+    return TrialFields(str(one.get("condition", "")), *_ends(one.get(_WINDOW)))
+
+
+def _changed(one: Mapping[str, Any], file: str, form: Mapping[str, str]) -> dict[str, Any]:
+    given: dict[str, Any] = {}
+    if CONDITION + file in form:
+        given["condition"] = form[CONDITION + file].strip()
+    if START + file in form:
+        given[_WINDOW] = _window(file, form[START + file].strip(), form.get(END + file, "").strip(), one.get(_WINDOW))
+    rest = {key: value for key, value in one.items() if key not in given}
+    return {**rest, **{key: value for key, value in given.items() if value}}
+
+
+def _window(file: str, start: str, end: str, before: Any) -> Any:
+    """Return the part as a subject file states it; as it was if nobody changed it, None without one."""
+    if not start and not end:
+        return None
+    if not start or not end:
+        raise SettingsError(f"Part of {file}: give its start and its end, in seconds, or neither")
+    try:
+        return before if (start, end) == _ends(before) else [number_of(start), number_of(end)]
+    except ValueError as error:
+        raise SettingsError(f"Part of {file}: {error}") from None
+
+
+def _ends(window: Any) -> tuple[str, str]:
+    """Return start and end as the form shows them; empty where there is no window, or a wrong one."""
+    match window:
+        case [int() | float() as start, int() | float() as end]:
+            return f"{start:g}", f"{end:g}"
+    return "", ""

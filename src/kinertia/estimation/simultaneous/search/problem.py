@@ -34,8 +34,7 @@ from kinertia.estimation.simultaneous.terms.model_terms import (
     StaticCoordinates,
     TaskMasses,
 )
-from kinertia.estimation.simultaneous.terms.motion_terms import JointRanges, Start
-from kinertia.estimation.simultaneous.terms.root_loads import RootLoads, TrunkBending
+from kinertia.estimation.simultaneous.terms.motion_terms import JointRanges, RootLoads, Start, TrunkBending
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.workload import side_by_side
 

@@ -4,7 +4,7 @@ import pytest
 
 pytest.importorskip("starlette", reason="needs the extra app (pip install -e '.[test]')")
 
-from kinertia.cli.web.trial_fields import TrialFields, conditions, trial_fields, with_trial_fields
+from kinertia.cli.web.rows import TrialFields, conditions, trial_fields, with_trial_fields
 from kinertia.errors import SettingsError
 
 CONTENT = {
