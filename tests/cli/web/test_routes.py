@@ -18,6 +18,7 @@ from kinertia.cli.web.jobs import Jobs
 from kinertia.errors import internal_error
 from kinertia.io import samples
 from kinertia.io.subject.body_files import measures_sheet
+from kinertia.io.subject.provenance import sha256
 from kinertia.io.subject.reader import read_subject
 from kinertia.report.figures.measures_picture import measures_picture
 
@@ -203,3 +204,26 @@ def test_the_address_of_a_form_leads_to_the_person(app, form):
     assert app.ask(f"/people/nobody/{form}").status == 404
     assert app.ask("/people/Anna%20B/secret").status == 404
     assert app.library.people() == [person]
+
+
+def test_two_conditions_are_offered_for_comparison_and_their_page_is_served(app, c3d_lab):
+    from app_tab import with_everything
+
+    person = with_everything(app.library, "Two", c3d_lab)
+    shutil.copyfile(c3d_lab / "walk.c3d", person.folder / "walk 2.c3d")
+    assert 'action="' + app.root + '/people/Two/comparison"' not in app.ask("/people/Two").text
+    two = person.subject.read_text().replace('"walk.c3d"', '"walk.c3d"\ncondition = "shod"')
+    person.subject.write_text(two + '\n[[trial]]\nmarkers = "walk 2.c3d"\ncondition = "barefoot"\n')
+    shown = app.ask("/people/Two").text
+    assert 'action="' + app.root + '/people/Two/comparison"' in shown
+    assert "<option selected>barefoot</option>" in shown
+    person.comparison.mkdir()
+    outcome = {"summary": sha256(person.results / "fit.json"), "before": "barefoot", "after": "shod"}
+    (person.comparison / "outcome.json").write_text(json.dumps(outcome))
+    (person.comparison / "compare.html").write_text("<title>compared</title>")
+    shown = app.ask("/people/Two").text
+    assert "/people/Two/comparison/compare.html" in shown
+    assert shown.count("<option selected>shod</option>") == 1
+    served = app.ask("/people/Two/comparison/compare.html")
+    assert (served.status, "compared" in served.text) == (200, True)
+    assert "sandbox" in served.headers["content-security-policy"]

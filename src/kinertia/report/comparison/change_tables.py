@@ -45,31 +45,30 @@ def change_sentences(found: Sequence[Change]) -> Iterator[str]:
         for one in found:
             if (one.quantity, one.joint, one.component, one.event) == wanted:
                 side = f"{SIDES[one.side][0].capitalize()} " if one.side else ""
-                yield f"{side}{one.joint} {one.component} {one.quantity}, {one.event}: {_judgement(one)}."
+                yield f"{side}{one.joint} {one.component} {one.quantity} ({one.event}) {_judgement(one)}."
 
 
 def speed_sentence(speed: Change | None) -> str:
     """State whether walking speed changed, and that moments change with it where it did, or may have."""
     if speed is None:
         return "Walking speed is not known; if it changed, moments did, too."
-    sentence = f"Walking speed: {_judgement(speed)}."
+    sentence = f"Walking speed {_judgement(speed)}."
     if speed.verdict == "changed" or abs(speed.difference) > NOTABLE * speed.before:
         sentence += " Moments change with speed: the speed may explain what changed below."
     return sentence
 
 
 def _judgement(one: Change) -> str:
+    """State what became of an outcome, as the predicate of a sentence that a clinician may copy."""
     digits = _DIGITS[one.unit]
-    pair = f"{one.before:.{digits}f} before, {one.after:.{digits}f} after"
-    if one.verdict != "changed":
-        pair += f", {one.unit}"
+    pair = f"from {one.before:.{digits}f} to {one.after:.{digits}f} {one.unit}"
     if one.doubt:
-        return f"cannot be judged, see the finding about the instruments ({pair})"
+        return f"went {pair}; a finding about the instruments keeps this from being judged"
     if one.verdict == "cannot be judged":
-        return f"cannot be judged, with {one.strides[0]} and {one.strides[1]} repeats ({pair})"
+        return f"went {pair}; {one.strides[0]} and {one.strides[1]} repeats cannot show whether that is a change"
     if one.verdict == "changed":
-        return f"changed by {one.difference:+.{digits}f} {one.unit} (SD {one.sd:.{digits}f}; {pair})"
-    return f"change not shown; one below {one.mdc95:.{digits}f} {one.unit} would be missed ({pair})"
+        return f"changed {pair} ({one.difference:+.{digits}f}, SD {one.sd:.{digits}f})"
+    return f"went {pair}; no change is shown, and one below {one.mdc95:.{digits}f} {one.unit} would be missed"
 
 
 def changed_sentence(found: Sequence[Change]) -> str:

@@ -1,6 +1,7 @@
 "use strict";
-// Opens the folded part that a link of the page leads to.
+// Opens the folded part that a link of the page leads to. Within a page that shows the verdict it is not shown again.
 (() => {
+  if (location.search === "?embedded") document.body.classList.add("embedded");
   function unfold() {
     const target = location.hash && document.getElementById(decodeURIComponent(location.hash.slice(1)));
     if (!target) return;
