@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from kinertia.estimation.changes.change import Change
+from kinertia.estimation.changes.change import Change, named_outcome
 from kinertia.estimation.changes.session_changes import changes_between, session, session_features
 from kinertia.estimation.changes.stride_features import Rows, event_means
 from kinertia.estimation.prior import literature_prior
@@ -234,8 +234,7 @@ def _truth(fit: Fit, exact: SyntheticTrial) -> dict[str, float]:
     names: dict[str, list[float]] = {}
     for (_, name, side, _), value in found.items():
         quantity, joint, event = name.split(" ", 2)
-        joint, _, component = joint.partition("_")
-        component = {"angle": "flexion"}.get(component, component)
+        quantity, joint, component = named_outcome(f"{quantity} {joint}")
         names.setdefault(" ".join((quantity, joint, component, event, side)), []).append(value)
     return {name: float(np.mean(values)) for name, values in names.items()}
 

@@ -118,12 +118,17 @@ def shown_from(difference: float, sd: float, freedom: float) -> tuple[float, flo
 def named_outcome(name: str) -> tuple[str, str, str]:
     """Return quantity, joint and component of "moment knee_adduction" or "angle knee_angle".
 
-    >>> named_outcome("angle knee_angle"), named_outcome("moment hip_rotation")
-    (('angle', 'knee', 'flexion'), ('moment', 'hip', 'rotation'))
+    >>> named_outcome("angle knee_angle"), named_outcome("moment hip_rotation"), named_outcome("angle pro_sup")
+    (('angle', 'knee', 'flexion'), ('moment', 'hip', 'rotation'), ('angle', 'forearm', 'pronation'))
     """
     quantity, _, rest = name.partition(" ")
     joint, _, component = rest.partition("_")
-    return quantity, joint, {"angle": "flexion"}.get(component, component)
+    return quantity, _JOINTS.get(joint, joint), _COMPONENTS.get(component, component)
+
+
+_JOINTS = {"arm": "shoulder", "pro": "forearm"}
+_COMPONENTS = {"angle": "flexion", "flex": "flexion", "add": "adduction", "rot": "rotation", "sup": "pronation"}
+"""Words for parts of the names of coordinates."""
 
 
 _SHORTEST_S = 0.8
