@@ -1,11 +1,12 @@
 """What a subject file states of its recordings: the part of the static trial, plates, whose foot a load is."""
 
+import shutil
 from datetime import date
 
 import numpy as np
 import pytest
 
-from kinertia.errors import FileError, SettingsError
+from kinertia.errors import FileError, MarkerSetError, SettingsError
 from kinertia.io.subject.person_recordings import read_static, read_trial, recording_date, session_date
 from kinertia.io.subject.reader import read_subject
 from kinertia.io.text.trc import write_trc
@@ -122,3 +123,20 @@ def test_what_the_subject_file_states_goes_first(c3d_lab, tmp_path):
     path.write_text(text + "\n[instruments]\ndate = 3.5\n", encoding="utf-8")
     with pytest.raises(FileError, match="date"):
         read_subject(path)
+
+
+def test_markers_that_a_trial_leaves_out_are_not_read_and_unknown_ones_are_refused(tmp_path, c3d_lab):
+    for name in ("static.c3d", "walk.c3d"):
+        shutil.copyfile(c3d_lab / name, tmp_path / name)
+    path, text = tmp_path / "subject.toml", (c3d_lab / "subject.toml").read_text()
+    path.write_text(text)
+    wanted = read_subject(path)
+    labels = read_trial(wanted, wanted.trials[0]).recording.markers.labels
+    path.write_text(f'{text}leave_out = ["{labels[0]}"]\n')
+    wanted = read_subject(path)
+    assert read_trial(wanted, wanted.trials[0]).recording.markers.labels == labels[1:]
+    path.write_text(f'{text}leave_out = ["NOBODY"]\n')
+    wanted = read_subject(path)
+    with pytest.raises(MarkerSetError) as raised:
+        read_trial(wanted, wanted.trials[0])
+    assert raised.value.finding.code == "L104"
