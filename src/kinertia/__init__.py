@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     __version__: str
 
     from kinertia.cohort.tables import read_cohort as read_cohort
-    from kinertia.diagnostics.model.model_check import ModelCheck as ModelCheck
-    from kinertia.diagnostics.model.model_check import check_model as check_model
+    from kinertia.diagnostics.model.mass_table import ModelCheck as ModelCheck
+    from kinertia.diagnostics.model.mass_table import check_model as check_model
     from kinertia.diagnostics.result.suitability import Suitability as Suitability
     from kinertia.diagnostics.result.suitability import suitability as suitability
     from kinertia.errors import BlockedError as BlockedError
@@ -128,7 +128,7 @@ _ROOMS = {
     "estimation.result.fit": "Fit",
     "estimation.result.trial_fit": "TrialFit",
     "estimation.simultaneous.fit": "Posterior",
-    "diagnostics.model.model_check": "ModelCheck check_model",
+    "diagnostics.model.mass_table": "ModelCheck check_model",
     "diagnostics.result.suitability": "Suitability suitability",
     "workflow.estimate": "estimate estimate_bsp",
     "workflow.from_files": "fit_subject prepare_subject",

@@ -9,7 +9,7 @@ from typing import Self
 
 from kinertia.diagnostics.context import PersonContext, RecordingContext
 from kinertia.diagnostics.markers.marker_set import MarkerSetMatch, match_labels
-from kinertia.diagnostics.model.model_check import ModelCheck, check_model
+from kinertia.diagnostics.model.mass_table import ModelCheck, check_model
 from kinertia.diagnostics.plates.ground_contact import PlateCheck, check_plates, coverage_of
 from kinertia.diagnostics.registry import MODEL_CHECKS
 from kinertia.diagnostics.runner import asked, explained, overruled, rules_of

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from kinertia.diagnostics.context import PersonContext
-from kinertia.diagnostics.model.model_check import (
+from kinertia.diagnostics.model.mass_table import (
     SIDE_COM_M,
     SIDE_MASS,
     SIDE_MOMENT,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import upright_model as upright
-from kinertia.diagnostics.model.model_check import check_model
+from kinertia.diagnostics.model.mass_table import check_model
 from kinertia.errors import SubjectError
 from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
 from kinertia.io.opensim.reader import read_osim
