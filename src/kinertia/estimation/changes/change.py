@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy import stats
 
 from kinertia.estimation.result.cycles import cycle_columns, spatiotemporal_columns
 from kinertia.estimation.result.gait_scores import with_norms
@@ -89,6 +88,8 @@ class Change:
 
         Instruments, body and markers are taken to be as uncertain with any number; None if MOST do not suffice.
         """
+        from scipy import stats  # loaded when it is needed
+
         spread = float(np.square(self.stride_sd).sum())
         shared = self.sd**2 - self.sd_by_source["stride"] ** 2
         counts = np.arange(2, MOST_WALKS + 1)
@@ -109,6 +110,8 @@ def shown_from(difference: float, sd: float, freedom: float) -> tuple[float, flo
         difference, sd: of the difference.
         freedom: degrees of freedom of `sd`; infinite where it is known, NaN where nothing can be judged.
     """
+    from scipy import stats  # loaded when it is needed
+
     if np.isnan(freedom):
         return np.nan, np.nan
     of_sd = stats.t(freedom)

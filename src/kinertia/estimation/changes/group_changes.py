@@ -12,7 +12,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 
 from kinertia.estimation.changes.change import PRIMARY, Change
 
@@ -81,6 +80,8 @@ def group_changes(people: Mapping[str, Sequence[Change]]) -> tuple[GroupChange, 
 
 
 def _averaged(named: Named, some: Sequence[Change]) -> GroupChange:
+    from scipy import stats  # loaded when it is needed
+
     differences = np.array([one.difference for one in some])
     count, mean = len(some), float(differences.mean())
     measured = float(np.sqrt(np.mean([one.sd**2 for one in some])))

@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kinertia.io.opensim.reader import INERTIA_TAGS, body_elements, marker_elements
 from kinertia.io.opensim.xml import Element, parse, replaced
 from kinertia.io.output_folder import write_then_rename
 from kinertia.model.bsp import BodySegmentParameters
@@ -251,6 +250,8 @@ def _welded(
     top: Element, document: Element, parent: str, child: str, row: np.ndarray
 ) -> list[tuple[tuple[int, int], bytes]]:
     """Return the insertions for one more body: in format 3 the joint is in its body, in format 4 in a set."""
+    from kinertia.io.opensim.reader import INERTIA_TAGS  # loaded when it is needed
+
     ends = {}
     for tag in ("BodySet", "JointSet"):
         objects = members.child("objects") if (members := document.child(tag)) is not None else None
@@ -267,6 +268,8 @@ def _welded(
 
 
 def _body_edits(document: Element, bsp: BodySegmentParameters) -> Iterator[_Edit]:
+    from kinertia.io.opensim.reader import INERTIA_TAGS, body_elements  # loaded when it is needed
+
     rows = dict(zip(bsp.segments, bsp.table(), strict=True))
     for body in body_elements(document):
         row = rows.get(body.name)
@@ -283,6 +286,8 @@ def _body_edits(document: Element, bsp: BodySegmentParameters) -> Iterator[_Edit
 
 def _marker_edits(model: OsimModel, document: Element, positions: Mapping[str, np.ndarray]) -> Iterator[_Edit]:
     """Yield edits of markers, each in the axes of its own frame, which may differ from its body's."""
+    from kinertia.io.opensim.reader import marker_elements  # loaded when it is needed
+
     known: dict[str, Marker] = {marker.label: marker for marker in model.skeleton.markers}
     for element in marker_elements(document):
         if element.name in positions:
