@@ -16,9 +16,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, get_type_hints
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, Task, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from rich.text import Text
 
 from kinertia.cli.compiling import compile_once
 from kinertia.diagnostics.runner import unknown_codes
@@ -29,8 +26,10 @@ from kinertia.io.text.number_table import number_of
 from kinertia.settings import Overrule, sex_of
 
 if TYPE_CHECKING:
-    from rich.console import Capture
+    from rich.console import Capture, Console
+    from rich.progress import Task
     from rich.table import Table
+    from rich.text import Text
 
 
 class Stream:
@@ -144,16 +143,18 @@ def plain_table(*headings: str) -> Table:
     return table
 
 
-class _TimeLeftColumn(TimeRemainingColumn):
-    """Column with the time left, labelled as such; empty as long as it is unknown."""
-
-    def render(self, task: Task) -> Text:
-        return super().render(task).append(" left") if task.time_remaining else Text()
-
-
 @contextmanager
 def shown_bar(console: Console) -> Iterator[Callable[[str, float], None]]:
     """Show a bar for every stage; yields a function that takes the stage's name and its share done."""
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+    from rich.text import Text
+
+    class _TimeLeftColumn(TimeRemainingColumn):
+        """Column with the time left, labelled as such; empty as long as it is unknown."""
+
+        def render(self, task: Task) -> Text:
+            return super().render(task).append(" left") if task.time_remaining else Text()
+
     columns = (TextColumn("{task.description:>20}"), BarColumn(), TimeElapsedColumn(), _TimeLeftColumn())
     with Progress(*columns, console=console, transient=True) as bar:
         shown: list[str] = []
