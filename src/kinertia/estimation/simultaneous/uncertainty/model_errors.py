@@ -44,8 +44,9 @@ CENTRE_SD_M = 0.005
 """Standard deviation of the knee's centre to the side, chosen here."""
 AXIS_SD_RAD = float(np.radians(4.0))
 """Standard deviation of its axis' direction about the thigh, chosen here."""
-_SHOWN = 1e-3
-"""Singular values relative to the largest below which no marker shows a combination of angles."""
+_SHOWN = 1e-6
+"""Added to the diagonal of the normal equations, relative to its largest: markers may not show all angles."""
+_FRAMES_AT_ONCE = 100
 _NEXT = {"Hip": "Knee", "Knee": "Ankle"}
 GROWTH = 2.0
 """Of what the markers' errors make of the moment of hip flexion. With it 95 % intervals cover after heel strike, where
@@ -76,16 +77,37 @@ def placement(
         tilts: static coordinate that tilts an axis -> its SD, rad.
     """
     names = [name for name in tilts if name in skeleton.locked]
-    free, c = skeleton.free(names), q.shape[1]
+    free, errors = skeleton.free(names), (np.repeat(misplaced_m, 3), np.array([tilts[name] for name in names]))
+    result = np.zeros(q.shape)
+    if errors[0].any() or errors[1].any():
+        for start in range(0, len(q), _FRAMES_AT_ONCE):
+            some = slice(start, start + _FRAMES_AT_ONCE)
+            result[some] = _placement(free, names, (skeleton, q[some]), seen[some], errors)
+    return result
+
+
+def _placement(
+    free: Skeleton,
+    names: Sequence[str],
+    at_rest: tuple[Skeleton, np.ndarray],
+    seen: np.ndarray,
+    errors: tuple[np.ndarray, np.ndarray],
+) -> np.ndarray:
+    """Return the variances of some frames, with these axes of the skeleton free, and the errors of markers and axes."""
+    skeleton, q = at_rest
     at = np.array([free.coordinates.index(name) for name in (*skeleton.coordinates, *names)])
     whole = np.empty((len(q), len(at)))
     whole[:, at] = np.hstack([q, np.tile([skeleton.locked[name] for name in names], (len(q), 1))])
     pose = free.pose(whole)
     by = (marker_jacobian(free, pose, free.marker_positions(pose)) * seen[..., None, None])[..., at]
-    moving, still = np.split(by.reshape(len(q), -1, len(at)), [c], axis=2)
-    follow = np.linalg.pinv(moving, rcond=_SHOWN)
-    changes = [follow * np.repeat(misplaced_m, 3), follow @ still * [tilts[name] for name in names]]
-    return np.where(skeleton.rotational, np.square(np.concatenate(changes, axis=2)).sum(axis=2), 0.0)
+    moving, still = np.split(by.reshape(len(q), -1, len(at)), [q.shape[1]], axis=2)
+    transposed = moving.transpose(0, 2, 1)
+    normal = transposed @ moving
+    every = np.arange(q.shape[1])
+    normal[:, every, every] += _SHOWN * normal[:, every, every].max(axis=1, keepdims=True)
+    follow = np.linalg.solve(normal, transposed)
+    changes = np.concatenate([follow * errors[0], follow @ still * errors[1]], axis=2)
+    return np.where(skeleton.rotational, np.square(changes).sum(axis=2), 0.0)
 
 
 def knee_geometry(skeleton: Skeleton, joints: Sequence[BodyJoint], loads: np.ndarray) -> np.ndarray:
