@@ -70,7 +70,7 @@ def test_only_angles_are_less_certain_where_markers_were_adapted_far_and_axes_ar
     growth = dict(
         zip(trial.skeleton.coordinates, np.nanmedian(after.coordinates / before.coordinates, axis=0), strict=True)
     )
-    assert growth["lumbar_rotation"] > 1.5
+    assert growth["lumbar_rotation"] > 1.15
     assert growth["hip_rotation_r"] > 1.1
     assert growth["pelvis_tx"] == 1.0
     np.testing.assert_array_equal(after.moments, before.moments)
@@ -78,6 +78,6 @@ def test_only_angles_are_less_certain_where_markers_were_adapted_far_and_axes_ar
 
 
 def test_markers_are_off_by_what_exceeds_their_prior():
-    moved = replace(GAIT27_UNCERTAINTY, moved_m={"torso": 0.013, "pelvis": 0.004})
-    off_m = [moved.misplaced_m(segment) for segment in ("torso", "pelvis", "foot_r")]
-    np.testing.assert_allclose(off_m, [0.012, 0.0, 0.0])
+    moved = replace(GAIT27_UNCERTAINTY, moved_m={"torso": 0.03, "thigh_r": 0.0065, "pelvis": 0.004})
+    off_m = [moved.misplaced_m(segment) for segment in ("torso", "thigh_r", "pelvis", "foot_r")]
+    np.testing.assert_allclose(off_m, [np.sqrt(75e-6), np.sqrt(17.25e-6), 0.0, 0.0])

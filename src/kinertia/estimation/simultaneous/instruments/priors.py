@@ -235,6 +235,8 @@ JOINT_CENTRE_SD_M = 0.010
 JOINT_AXIS_SD_RAD = float(np.radians(5.0))
 MARKER_SD_M = 0.005
 """The calibrated skeleton has its markers from these trials already; what remains is the error of that calibration."""
+MOST_MOVED_M = 0.010
+"""What markers are farther from where a model has them was the model's mistake, which adapting them has mended."""
 FIXED_AXIS_SD_RAD = float(np.radians(4.0) / np.sqrt(2.0))
 """Of each of two directions in which an axis of knee or ankle that is no unknown may be tilted: 4 degrees together."""
 WITHOUT_STATIC = 2.0
@@ -276,7 +278,8 @@ class ModelUncertainty:
     def misplaced_m(self, segment: str) -> float:
         """Return by how much, along each axis, markers of a segment may be off beyond their prior."""
         known = 0.0 if self.marker_sd_m is None else self.marker_sd_m
-        return float(np.sqrt(max(self.moved_m.get(segment, 0.0) ** 2 - known**2, 0.0)))
+        moved = min(self.moved_m.get(segment, 0.0), MOST_MOVED_M)
+        return float(np.sqrt(max(moved**2 - known**2, 0.0)))
 
     def with_axes(self) -> Self:
         """Return the uncertainty with the axes of knees, ankles and elbows of the 27-DOF model free."""
