@@ -5,7 +5,6 @@ What was applied is noted with what stood there before; all else follows from th
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import PureWindowsPath
 from typing import Any
 
 from kinertia.cli.web.entries import entries, label_of, write
@@ -13,6 +12,7 @@ from kinertia.cli.web.file_table import Content, put_aside
 from kinertia.cli.web.library import PersonFolder
 from kinertia.errors import SettingsError
 from kinertia.findings.remedy import DIAGNOSTICS, Remedy
+from kinertia.io.subject.tables import trial_name
 
 _NOTES = "remedies"
 _LONGEST_REASON = 300
@@ -107,7 +107,7 @@ def _proposed(person: PersonFolder) -> Iterator[Remedy]:
 
 
 def _write(person: PersonFolder, before: Content, after: Content) -> None:
-    """Write the entries; those of a trial that goes are remembered, as when the form leaves it out."""
+    """Write the entries, and remember those of a trial that is removed, as when the form leaves it out."""
     write(person, after)
     person.note(aside=put_aside(before, after, person.notes().get("aside", [])))
 
@@ -117,15 +117,11 @@ def _trials(content: Content) -> list[dict[str, Any]]:
     return [dict(one) for one in trials if isinstance(one, Mapping)] if isinstance(trials, list) else []
 
 
-def _name(trial: Mapping[str, Any]) -> str:
-    return str(trial.get("name", PureWindowsPath(str(trial.get("markers", ""))).stem))
-
-
 def _now(content: Content, remedy: Remedy) -> Any:
     """Return what stands in place of a setting: its value, or the whole trial; None for nothing."""
     own: Any = content
     if remedy.trial:
-        own = next((one for one in _trials(content) if _name(one) == remedy.trial), None)
+        own = next((one for one in _trials(content) if trial_name(one) == remedy.trial), None)
         if own is None or not remedy.key:
             return own
     table = own if remedy.table == "trial" else own.get(remedy.table, {})
@@ -140,7 +136,7 @@ def _with(content: Content, remedy: Remedy, value: Any, reason: str) -> Content:
         return _in_table(content, remedy, value, reason)
     trials = []
     for one in _trials(content):
-        if _name(one) != remedy.trial:
+        if trial_name(one) != remedy.trial:
             trials.append(one)
         elif remedy.overrules:
             trials.append(_in_table(one, remedy, value, reason))

@@ -14,6 +14,7 @@ from kinertia.estimation.result.gait_scores import with_norms
 from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.io.norms_file import Norm
 
+Names = tuple[str, str, str, str, str, str]
 Verdict = Literal["changed", "not shown", "cannot be judged"]
 SOURCES = ("instruments", "body", "markers", "stride")
 PRIMARY = (
@@ -30,14 +31,43 @@ _POWER = 0.8
 
 
 @dataclass(frozen=True)
-class Change:
-    """The change of one outcome between two conditions.
+class NamedOutcome:
+    """What was compared.
 
     Attributes:
         quantity: "moment" or "angle".
         joint, component, side: as in `joint_moments.sto`: "knee", "adduction", "r".
         event: one of EVENTS.
-        unit: of the numbers below; moments are internal, over body mass.
+        unit: of its numbers; moments are internal, over body mass.
+
+    Examples:
+        >>> NamedOutcome("moment", "knee", "adduction", "r", "mid-stance", "N m/kg").primary
+        True
+    """
+
+    quantity: str
+    joint: str
+    component: str
+    side: str
+    event: str
+    unit: str
+
+    @property
+    def names(self) -> Names:
+        """The outcome's quantity, joint, component, side, event and unit."""
+        return self.quantity, self.joint, self.component, self.side, self.event, self.unit
+
+    @property
+    def primary(self) -> bool:
+        """Whether the outcome was named beforehand."""
+        return (self.quantity, self.joint, self.component, self.event) in PRIMARY
+
+
+@dataclass(frozen=True)
+class Change(NamedOutcome):
+    """The change of one outcome between two conditions.
+
+    Attributes:
         before, after: means over the strides of each condition.
         strides: number of strides of each.
         sd: standard deviation of the difference.
@@ -54,12 +84,6 @@ class Change:
         (-0.1, 'changed')
     """
 
-    quantity: str
-    joint: str
-    component: str
-    side: str
-    event: str
-    unit: str
     before: float
     after: float
     strides: tuple[int, int]
@@ -96,11 +120,6 @@ class Change:
         limits = stats.t.ppf(0.975, 2 * (counts - 1)) + stats.norm.ppf(_POWER)
         enough = np.flatnonzero(limits * np.sqrt(max(shared, 0.0) + spread / counts) <= abs(change))
         return int(counts[enough[0]]) if len(enough) else None
-
-    @property
-    def primary(self) -> bool:
-        """Whether the outcome was named beforehand."""
-        return (self.quantity, self.joint, self.component, self.event) in PRIMARY
 
 
 def shown_from(difference: float, sd: float, freedom: float) -> tuple[float, float]:

@@ -13,17 +13,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.estimation.changes.change import PRIMARY, Change
-
-Named = tuple[str, str, str, str, str, str]
+from kinertia.estimation.changes.change import Change, NamedOutcome, Names
 
 
 @dataclass(frozen=True)
-class GroupChange:
+class GroupChange(NamedOutcome):
     """The change of one outcome in a group.
 
     Attributes:
-        quantity, joint, component, side, event, unit: as of `Change`.
         people: number of people whose change is averaged: not those with a `doubt`.
         changed: number of them whose own change is shown.
         before, after, difference: means over people.
@@ -42,12 +39,6 @@ class GroupChange:
         (-0.15, 0.071, 0.068, 2)
     """
 
-    quantity: str
-    joint: str
-    component: str
-    side: str
-    event: str
-    unit: str
     people: int
     changed: int
     before: float
@@ -61,25 +52,18 @@ class GroupChange:
     upper: float
     p: float
 
-    @property
-    def primary(self) -> bool:
-        """Whether the outcome was named beforehand."""
-        return (self.quantity, self.joint, self.component, self.event) in PRIMARY
-
 
 def group_changes(people: Mapping[str, Sequence[Change]]) -> tuple[GroupChange, ...]:
     """Average the changes of each outcome over the people who have it, in the order of their first appearance."""
-    outcomes: dict[Named, list[Change]] = {}
+    outcomes: dict[Names, list[Change]] = {}
     for changes in people.values():
         for one in changes:
             if not one.doubt:
-                outcomes.setdefault((one.quantity, one.joint, one.component, one.side, one.event, one.unit), []).append(
-                    one
-                )
-    return tuple(_averaged(named, some) for named, some in outcomes.items())
+                outcomes.setdefault(one.names, []).append(one)
+    return tuple(_averaged(names, some) for names, some in outcomes.items())
 
 
-def _averaged(named: Named, some: Sequence[Change]) -> GroupChange:
+def _averaged(names: Names, some: Sequence[Change]) -> GroupChange:
     from scipy import stats  # loaded when it is needed
 
     differences = np.array([one.difference for one in some])
@@ -91,7 +75,7 @@ def _averaged(named: Named, some: Sequence[Change]) -> GroupChange:
     half = float(student.ppf(0.975)) * error
     p = float(2.0 * student.sf(abs(mean) / max(error, 1e-300))) if count > 1 else np.nan
     return GroupChange(
-        *named,
+        *names,
         people=count,
         changed=sum(one.verdict == "changed" for one in some),
         before=float(np.mean([one.before for one in some])),

@@ -137,6 +137,14 @@ class Model(Table):
     calibrate: bool = Field(default=False, description="OpenSim model only; true: markers and joint centres may move")
 
 
+def trial_name(table: Mapping[str, Any]) -> Any:
+    """Return the name of a `[[trial]]`: as stated, or that of its file of markers without the ending."""
+    markers = table.get("markers")
+    # Windows' kind of path knows both separators
+    default = PureWindowsPath(markers).stem if isinstance(markers, str | Path) else "trial"
+    return table.get("name", default)
+
+
 class TrialFiles(Table):
     """Files of one dynamic trial; `window_s` (start, end) overrides the measured window, s."""
 
@@ -184,9 +192,7 @@ class TrialFiles(Table):
     def _named(cls, data: Any) -> Any:
         if not isinstance(data, dict):
             return data
-        markers = data.get("markers")
-        # Windows' kind of path knows both separators
-        return {"name": PureWindowsPath(markers).stem if isinstance(markers, str | Path) else "trial", **data}
+        return {"name": trial_name(data), **data}
 
 
 class InstrumentsFiles(Instruments):

@@ -77,37 +77,32 @@ def placement(
         tilts: static coordinate that tilts an axis -> its SD, rad.
     """
     names = [name for name in tilts if name in skeleton.locked]
-    free, errors = skeleton.free(names), (np.repeat(misplaced_m, 3), np.array([tilts[name] for name in names]))
+    of_markers, of_axes = np.repeat(misplaced_m, 3), np.array([tilts[name] for name in names])
     result = np.zeros(q.shape)
-    if errors[0].any() or errors[1].any():
-        for start in range(0, len(q), _FRAMES_AT_ONCE):
-            some = slice(start, start + _FRAMES_AT_ONCE)
-            result[some] = _placement(free, names, (skeleton, q[some]), seen[some], errors)
-    return result
-
-
-def _placement(
-    free: Skeleton,
-    names: Sequence[str],
-    at_rest: tuple[Skeleton, np.ndarray],
-    seen: np.ndarray,
-    errors: tuple[np.ndarray, np.ndarray],
-) -> np.ndarray:
-    """Return the variances of some frames, with these axes of the skeleton free, and the errors of markers and axes."""
-    skeleton, q = at_rest
+    if not (of_markers.any() or of_axes.any()):
+        return result
+    free = skeleton.free(names)
     at = np.array([free.coordinates.index(name) for name in (*skeleton.coordinates, *names)])
     whole = np.empty((len(q), len(at)))
     whole[:, at] = np.hstack([q, np.tile([skeleton.locked[name] for name in names], (len(q), 1))])
-    pose = free.pose(whole)
-    by = (marker_jacobian(free, pose, free.marker_positions(pose)) * seen[..., None, None])[..., at]
-    moving, still = np.split(by.reshape(len(q), -1, len(at)), [q.shape[1]], axis=2)
-    transposed = moving.transpose(0, 2, 1)
-    normal = transposed @ moving
-    every = np.arange(q.shape[1])
+    for start in range(0, len(q), _FRAMES_AT_ONCE):
+        some = slice(start, start + _FRAMES_AT_ONCE)
+        pose = free.pose(whole[some])
+        by = (marker_jacobian(free, pose, free.marker_positions(pose)) * seen[some, :, None, None])[..., at]
+        moving, still = np.split(by.reshape(len(by), -1, len(at)), [q.shape[1]], axis=2)
+        follow = _following(moving)
+        changes = np.concatenate([follow * of_markers, follow @ still * of_axes], axis=2)
+        result[some] = np.square(changes).sum(axis=2)
+    return np.where(skeleton.rotational, result, 0.0)
+
+
+def _following(by: np.ndarray) -> np.ndarray:
+    """Return the changes (d, c, r) of coordinates that follow r marker coordinates, from the derivatives (d, r, c)."""
+    transposed, every = by.transpose(0, 2, 1), np.arange(by.shape[2])
+    normal = transposed @ by
     normal[:, every, every] += _SHOWN * normal[:, every, every].max(axis=1, keepdims=True)
-    follow = np.linalg.solve(normal, transposed)
-    changes = np.concatenate([follow * errors[0], follow @ still * errors[1]], axis=2)
-    return np.where(skeleton.rotational, np.square(changes).sum(axis=2), 0.0)
+    result: np.ndarray = np.linalg.solve(normal, transposed)
+    return result
 
 
 def knee_geometry(skeleton: Skeleton, joints: Sequence[BodyJoint], loads: np.ndarray) -> np.ndarray:
