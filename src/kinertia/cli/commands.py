@@ -126,7 +126,7 @@ _UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line on these arguments, or on those of this process."""
+    """Run the command line with these arguments, or with those of this process."""
     given = sys.argv[1:] if arguments is None else list(arguments)
     run(application_for(given), given)
 

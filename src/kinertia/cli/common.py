@@ -150,7 +150,7 @@ def shown_bar(console: Console) -> Iterator[Callable[[str, float], None]]:
     from rich.text import Text
 
     class _TimeLeftColumn(TimeRemainingColumn):
-        """Column with the time left, labelled as such; empty as long as it is unknown."""
+        """Column with the time left; it is empty while that is unknown."""
 
         def render(self, task: Task) -> Text:
             return super().render(task).append(" left") if task.time_remaining else Text()

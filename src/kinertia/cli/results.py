@@ -76,7 +76,7 @@ def compare(
         raise typer.BadParameter(f"give 2 to {MOST_FITS} folders of results; these are {len(results)}")
     paths = [path.resolve() for path in results]
     if len(set(paths)) < len(paths):
-        raise typer.BadParameter("one folder is named twice")
+        raise typer.BadParameter("the same folder is given twice")
     results_folder(output, overwrite)
     names = names_from_common_folder(paths)
     with shown_progress() as progress:
@@ -205,7 +205,7 @@ def _norms_for(fit: Fit, curves: CurvesByStage, path: Path) -> tuple[dict[str, N
     check_convention(fit, norms)
     other = sorted(set(norms) - known)
     if len(other) == len(norms):
-        expected = f"its names are those of cycles.csv, such as {min(known)}" if known else "there are no strides"
+        expected = f"use names from cycles.csv, such as {min(known)}" if known else "there are no strides"
         raise FileError(
             path, f"no quantity of it is among the curves of this fit (the first is {other[0]}); {expected}"
         )

@@ -150,7 +150,7 @@ def changes_sentence(people: Sequence[PersonChanges]) -> str:
 
 
 def mean_parts(people: Sequence[PersonChanges], conditions: tuple[str, str] | None) -> Iterator[Part]:
-    """Return a table of the mean changes: speed, steps and the outcomes that were named beforehand."""
+    """Return a table of the mean changes: speed, steps and the primary outcomes."""
     means = means_of(people)
     if means and conditions is not None:
         text = (

@@ -150,7 +150,7 @@ def curve_columns(found: Sequence[CurveChange]) -> dict[str, list[Any]]:
 
 
 def change_rows(found: Sequence[Change]) -> list[dict[str, Any]]:
-    """Return the rows of the page's table: numbers with their text, outcomes that were named beforehand first."""
+    """Return the rows of the page's table: numbers with their text, primary outcomes first."""
     order = sorted(found, key=lambda one: (not one.primary, one.quantity != "moment"))
     return [
         {
@@ -175,7 +175,7 @@ def group_columns(found: Sequence[GroupChange]) -> dict[str, list[Any]]:
 
 
 def group_rows(found: Sequence[GroupChange]) -> list[tuple[str, ...]]:
-    """Return rows of text: speed, steps and the outcomes that were named beforehand."""
+    """Return rows of text: speed, steps and the primary outcomes."""
     chosen = [one for one in found if one.quantity == "gait" or one.primary]
     return [_group_row(one) for one in chosen]
 
