@@ -72,12 +72,12 @@ class _Checked:
     @property
     def overviews(self) -> list[Overview]:
         of_person = [] if self.person is None else [self.person.overview]
-        return [*of_person, *(one.overview for one in self.models)]
+        return [*of_person, *(model.overview for model in self.models)]
 
     @property
     def status(self) -> int:
         """Exit status: 1 where an ERROR is open."""
-        return int(any(one.failed for one in self.overviews))
+        return int(any(overview.failed for overview in self.overviews))
 
 
 def check(
@@ -137,7 +137,7 @@ def check(
     files = [subject_file_in(path) if _holds_subject_file(path) else path for path in files]
     subjects = [path for path in files if path.suffix.lower() == ".toml"]
     given = (static, forces, loads, mass, height, sex, markers, model, calibrate or None)
-    if subjects and (len(files) > 1 or any(one is not None for one in given)):
+    if subjects and (len(files) > 1 or any(option is not None for option in given)):
         raise FileError(
             subjects[0], "a subject file contains everything; give it alone, without other files or options"
         )
@@ -158,7 +158,7 @@ def check(
             person, read = _of_files(named, stated, static, progress)
         checked = _Checked(
             None if person is None else check_person(person.with_overrule(overrule)),
-            [check_osim(one, who, overrule) for one in osim],
+            [check_osim(model_file, who, overrule) for model_file in osim],
             read,
             person.lacking if subjects and person is not None else (),
         )
@@ -172,7 +172,7 @@ def check(
 def _of_subject_file(path: Path, progress: Progress) -> tuple[Person, dict[str, str]]:
     """Read the person of a subject file, and list the files of each recording."""
     wanted = read_subject(path, to_fit=False)
-    read = {one.name: _names(one.markers, one.forces) for one in wanted.trials}
+    read = {trial.name: _names(trial.markers, trial.forces) for trial in wanted.trials}
     if wanted.model.static is not None:
         read[wanted.model.static.stem] = wanted.model.static.name
     return read_person(wanted, progress), read
@@ -182,14 +182,17 @@ def _of_files(
     named: Sequence[RecordingFiles], stated: Person, static: Path | None, progress: Progress
 ) -> tuple[Person | None, dict[str, str]]:
     """Read the person of files alone, None where there are none, and list the files of each recording."""
-    read = {name: _names(one.markers, one.forces) for name, one in zip(trial_names(named), named, strict=True)}
+    read = {
+        name: _names(recorded.markers, recorded.forces)
+        for name, recorded in zip(trial_names(named), named, strict=True)
+    }
     read |= {} if static is None else {static.stem: static.name}
     person = read_files(named, stated, static, lambda share: progress("reading", share)) if named else None
     return person, read
 
 
 def _holds_subject_file(path: Path) -> bool:
-    return path.is_dir() and any(each.suffix.lower() == ".toml" for each in path.iterdir())
+    return path.is_dir() and any(member.suffix.lower() == ".toml" for member in path.iterdir())
 
 
 def _names(markers: Path, forces: Path | None) -> str:
@@ -198,15 +201,17 @@ def _names(markers: Path, forces: Path | None) -> str:
 
 def _for_scripts(checked: _Checked) -> dict[str, Any]:
     """Return the result for scripts."""
-    findings = [one.to_dict() for overview in checked.overviews for one in overview.findings]
+    findings = [finding.to_dict() for overview in checked.overviews for finding in overview.findings]
     recordings = () if checked.person is None else checked.person.recordings
     return {
-        "verdict": [one.verdict for one in checked.overviews],
-        "rules_run": sum(one.rules for one in checked.overviews),
+        "verdict": [overview.verdict for overview in checked.overviews],
+        "rules_run": sum(overview.rules for overview in checked.overviews),
         "findings": findings,
         "fit_also_needs": list(checked.lacking),
-        "recordings": [{"name": one.context.name, "facts": dict(checked.facts(one))} for one in recordings],
-        "models": [{"name": one.name, "facts": dict(one.facts.facts())} for one in checked.models],
+        "recordings": [
+            {"name": recording.context.name, "facts": dict(checked.facts(recording))} for recording in recordings
+        ],
+        "models": [{"name": model.name, "facts": dict(model.facts.facts())} for model in checked.models],
     }
 
 
@@ -219,7 +224,7 @@ def _show(checked: _Checked, page: Path | None, verbose: bool, waive: Sequence[s
         _show_model(model)
     for overview in checked.overviews:
         show_overview(overview, verbose)
-    found = [one for overview in checked.overviews for one in overview.findings]
+    found = [finding for overview in checked.overviews for finding in overview.findings]
     show_idle_waivers(waive, found, ("file", "recording", "person"))
     if checked.lacking:
         out.print(f"kinertia fit also needs, under [subject]: {', '.join(checked.lacking)}", soft_wrap=True)
@@ -245,11 +250,11 @@ def _show_model(model: ModelOverview) -> None:
 
 def _show_recording(recording: RecordingCheck, facts: Sequence[tuple[str, str]]) -> None:
     _show_facts(recording.context.name, facts)
-    shown = [one for one in recording.markers if one.share < 1.0]
+    shown = [marker for marker in recording.markers if marker.share < 1.0]
     if shown:
         gaps = plain_table("marker", "seen\n(%)", "longest gap\n(s)")
-        for one in shown:
-            gaps.add_row(one.label, f"{100 * one.share:.0f}", f"{one.longest_gap_s:.2f}")
+        for marker in shown:
+            gaps.add_row(marker.label, f"{100 * marker.share:.0f}", f"{marker.longest_gap_s:.2f}")
         out.print(gaps)
     if recording.plates:
         plates = plain_table("plate", "foot on plate", "peak\n(N)", "off plate\n(% of load)")

@@ -126,13 +126,13 @@ def cohort(
     kinertia cohort STUDY -o out --slurm slurm.toml
     """
     expect_extra()
-    for one, other, both in (
+    for option, other, both in (
         ("--scheduler", "--slurm", scheduler and slurm),
         ("--json", "--json-lines", as_json and json_lines),
         ("--learn", "--conditions", learn and conditions),
     ):
         if both:
-            raise SettingsError(f"{one} and {other}: give one of them")
+            raise SettingsError(f"{option} and {other}: give one of them")
     where = _Where(scheduler, None if slurm is None else read_slurm(slurm))
     lines = JsonLines(json_lines)
     be_quiet(quiet or json_lines)
@@ -140,7 +140,7 @@ def cohort(
     if norms is not None:
         expect_all_nine(wanted.norms)
     people = people_of(study, output)
-    if learn and any(one.session for one in people):
+    if learn and any(person.session for person in people):
         raise SettingsError("--learn does not know sessions: leave out the column 'session'")
     pairs = [] if conditions is None else pairs_of(people, conditions)
     if dry_run:
@@ -159,21 +159,21 @@ def _plan(people: Sequence[Participant], output: Path, where: _Where, lines: Jso
     """Show who would be fitted, without fitting anyone; status 1 if anyone's inputs are incomplete."""
     everybody = _standing(people, output, lines)
     _report_plan(everybody, where)
-    plan = [_planned(one) for one in everybody]
-    for each in plan:
-        lines.say("plan", **each)
-    return Outcome({"people": plan}, int(any(one.problem for one in everybody)))
+    plan = [_planned(standing) for standing in everybody]
+    for line in plan:
+        lines.say("plan", **line)
+    return Outcome({"people": plan}, int(any(standing.problem for standing in everybody)))
 
 
-def _planned(one: Standing) -> dict[str, Any]:
+def _planned(standing: Standing) -> dict[str, Any]:
     """Return what is to be done for a person, for scripts."""
-    state = "lacking" if one.problem else "due" if one.due else "as before"
+    state = "lacking" if standing.problem else "due" if standing.due else "as before"
     return {
-        "person": one.person.name,
+        "person": standing.person.name,
         "state": state,
-        "trials": one.trials,
-        "frames": one.frames,
-        "why": one.problem or ("" if one.record is None else one.record.sentence),
+        "trials": standing.trials,
+        "frames": standing.frames,
+        "why": standing.problem or ("" if standing.record is None else standing.record.sentence),
     }
 
 
@@ -208,8 +208,8 @@ class _Where:
         if self.slurm is not None:
             return f"On SLURM, in {min(self.slurm.workers, people)} jobs of {self.slurm.memory_gb:g} GB"
         size = local_size(people)
-        each = f"each with one thread and at most {size.memory_bytes / 1024**3:.1f} GB of memory"
-        return f"On this computer, in {size.workers} process{'es' if size.workers > 1 else ''}, {each}"
+        limits = f"each with one thread and at most {size.memory_bytes / 1024**3:.1f} GB of memory"
+        return f"On this computer, in {size.workers} process{'es' if size.workers > 1 else ''}, {limits}"
 
     def workers(self, people: int) -> int:
         """Return the number of workers; one where only the scheduler has it."""
@@ -240,7 +240,7 @@ def _run(
     everybody = _standing(people, output, lines)
     _say_due(everybody)
     records = _fitted(everybody, output.resolve(), where, lines)
-    outcomes = [one.outcome(records.get(one.person.name), output) for one in everybody]
+    outcomes = [standing.outcome(records.get(standing.person.name), output) for standing in everybody]
     with shown_progress() as shown:
         progress = lines.with_progress(shown)
         changes = changes_of(output, pairs, wanted.conditions, progress) if wanted.conditions else []
@@ -250,7 +250,7 @@ def _run(
     _report(outcomes, output)
     if changes:
         out.print(changes_sentence(changes), soft_wrap=True)
-    fitted, passed = sum(one.fitted for one in outcomes), sum(not one.status for one in outcomes)
+    fitted, passed = sum(outcome.fitted for outcome in outcomes), sum(not outcome.status for outcome in outcomes)
     lines.say("end", folder=str(output), people=len(outcomes), fitted=fitted, passed=passed)
     return outcomes
 
@@ -288,15 +288,15 @@ def _standing(people: Sequence[Participant], output: Path, lines: JsonLines) -> 
     everybody = []
     with shown_progress() as shown:
         progress = lines.with_progress(shown)
-        for k, one in enumerate(standings(people, output), start=1):
-            everybody.append(one)
+        for k, standing in enumerate(standings(people, output), start=1):
+            everybody.append(standing)
             progress("looking for changes", k / len(people))
     return everybody
 
 
 def _fitted(everybody: Sequence[Standing], output: Path, where: _Where, lines: JsonLines) -> dict[str, Record]:
     """Fit everyone who is due and return records by name; nothing is started if no one is due."""
-    jobs = [Job.of(one, output) for one in everybody if one.due]
+    jobs = [Job.of(standing, output) for standing in everybody if standing.due]
     records: dict[str, Record] = {}
     if not jobs:
         return records
@@ -314,7 +314,7 @@ def _fitted(everybody: Sequence[Standing], output: Path, where: _Where, lines: J
 
 
 def _say_due(everybody: Sequence[Standing]) -> None:
-    due, lacking = sum(one.due for one in everybody), sum(bool(one.problem) for one in everybody)
+    due, lacking = sum(standing.due for standing in everybody), sum(bool(standing.problem) for standing in everybody)
     kept = len(everybody) - due - lacking
     out.print(f"{len(everybody)} people: {due} to fit, {kept} as before, {lacking} with missing inputs")
 
@@ -322,13 +322,17 @@ def _say_due(everybody: Sequence[Standing]) -> None:
 def _report_plan(everybody: Sequence[Standing], where: _Where) -> None:
     """Show the people, the amount of data, what is missing, and roughly how long the fits take."""
     table = plain_table("person", "", "trials", "frames")
-    for one in everybody:
-        before = "as before" if one.record is None or one.record.fitted else f"as before: {one.record.sentence}"
-        state = one.problem or ("to fit" if one.due else before)
-        table.add_row(one.person.name, state, str(one.trials or "–"), str(one.frames or "–"))
+    for standing in everybody:
+        before = (
+            "as before"
+            if standing.record is None or standing.record.fitted
+            else f"as before: {standing.record.sentence}"
+        )
+        state = standing.problem or ("to fit" if standing.due else before)
+        table.add_row(standing.person.name, state, str(standing.trials or "–"), str(standing.frames or "–"))
     out.print(table)
     _say_due(everybody)
-    due = [one for one in everybody if one.due]
+    due = [standing for standing in everybody if standing.due]
     if due:
         minutes = guessed_seconds(due, where.workers(len(due))) / 60.0
         shared = " of one processor, to be divided by the number of workers" if where.scheduler else ""

@@ -230,7 +230,7 @@ def as_named_now(given: Sequence[str]) -> list[str]:
         raise KinertiaError(f"kinertia {command} moved to the repository: run {MOVED[command]} in a clone of it")
     for old in [name for name in RENAMED if name in given]:
         err.print(f"{old} is now {RENAMED[old]}; the old name will be removed in the next version")
-    return [RENAMED.get(one, one) for one in given]
+    return [RENAMED.get(argument, argument) for argument in given]
 
 
 def failure_text(error: Exception, given: Sequence[str]) -> str:

@@ -92,11 +92,11 @@ def show_error(message: str) -> None:
     err.print(text, soft_wrap=True)
 
 
-def show_problem(error: KinertiaError, of: str = "") -> None:
+def show_problem(error: KinertiaError, prefix: str = "") -> None:
     """Show one line per finding that stopped something, or for the error; `of` states whose it is among several."""
     also = error.also if isinstance(error, FileError) else ()
     for line in str(error).split("\n") if isinstance(error, BlockedError) else map(str, (error, *also)):
-        show_error(f"{of}{line}")
+        show_error(f"{prefix}{line}")
     for k, line in enumerate(getattr(error, "__notes__", ())):
         err.print(f"{'then' if k else 'next'}: {line}", soft_wrap=True, markup=False, highlight=False)
 
@@ -307,18 +307,18 @@ def add_command(
 
 def of_error(error: KinertiaError) -> dict[str, Any]:
     """Return an error for scripts: its text, its findings, and what to do next where that is known."""
-    content: dict[str, Any] = {"error": str(error), "findings": [one.to_dict() for one in findings_of(error)]}
+    content: dict[str, Any] = {"error": str(error), "findings": [finding.to_dict() for finding in findings_of(error)]}
     notes = getattr(error, "__notes__", ())
     return {**content, "next": list(notes)} if notes else content
 
 
 def _with_json(command: Callable[..., Outcome], hints: Mapping[str, Any]) -> Callable[..., NoReturn]:
     signature = inspect.signature(command)
-    own = "as_json" in signature.parameters
+    declared = "as_json" in signature.parameters
 
     @wraps(command)
     def run(*, as_json: bool, **given: Any) -> NoReturn:
-        if own:
+        if declared:
             given["as_json"] = as_json
         with out.capture() if as_json else nullcontext():
             outcome = command(**given)
@@ -326,10 +326,12 @@ def _with_json(command: Callable[..., Outcome], hints: Mapping[str, Any]) -> Cal
             print_json(outcome.content)
         raise typer.Exit(outcome.status)
 
-    if not own:
+    if not declared:
         option = inspect.Parameter("as_json", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=_AS_JSON)
         signature = signature.replace(parameters=[*signature.parameters.values(), option])
-    annotated = [one.replace(annotation=hints.get(name, _AS_JSON)) for name, one in signature.parameters.items()]
+    annotated = [
+        parameter.replace(annotation=hints.get(name, _AS_JSON)) for name, parameter in signature.parameters.items()
+    ]
     run.__signature__ = signature.replace(parameters=annotated)  # type: ignore[attr-defined]
-    run.__annotations__ = {one.name: one.annotation for one in annotated}
+    run.__annotations__ = {parameter.name: parameter.annotation for parameter in annotated}
     return run

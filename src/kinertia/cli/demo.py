@@ -277,7 +277,7 @@ def _faults(result: Demo) -> str:
 
 def _two_level_verdict(before: tuple[float, float, float], after: tuple[float, float, float]) -> str:
     """Compare two-level's RMS errors with the tables' in a sentence, by the numbers of this run."""
-    worse = sum(one < other for one, other in zip(before, after, strict=True))
+    worse = sum(by_tables < by_fit for by_tables, by_fit in zip(before, after, strict=True))
     if worse == len(before):
         finding = "Two-level explains the forces far better, yet every class of parameters is further from the truth"
     elif worse:

@@ -61,7 +61,7 @@ def init(
     folder = folder.parent if folder.is_file() else folder
     if measures:
         return _measures(folder)
-    path, own = folder / SUBJECT, folder / MARKER_SET
+    path, drafted = folder / SUBJECT, folder / MARKER_SET
     if path.exists():
         raise FileError(path, "already exists and was not changed; remove it to draft a new one")
     if folder.is_dir() and not os.access(folder, os.W_OK):
@@ -85,11 +85,13 @@ def init(
     if MARKER_SET in files:
         against = next((line.partition(NOT_USED)[2] for line in lines if NOT_USED in line), "")
         check = f"it is not used: {against} and remove the # before markers" if against else "check it"
-        out.print(f"no marker-set preset fits: wrote {own}, drafted from the marker positions; {check}", soft_wrap=True)
+        out.print(
+            f"no marker-set preset fits: wrote {drafted}, drafted from the marker positions; {check}", soft_wrap=True
+        )
     check = command_line(["kinertia", "check", str(path)])
     out.print(f"wrote {path}: fill in what it asks for, then run: {check}", soft_wrap=True)
     asked = [line.removeprefix("# ").partition(" =")[0] for line in lines if FILL_IN in line]
-    marker_set = str(own) if MARKER_SET in files else None
+    marker_set = str(drafted) if MARKER_SET in files else None
     return Outcome({"subject_file": str(path), "marker_set": marker_set, "fill_in": asked, "notes": notes})
 
 
@@ -123,7 +125,7 @@ def _asked(known: Mapping[str, object]) -> dict[str, object]:
 
 def _asked_conditions(trials: Sequence[Mapping[str, str]], known: Mapping[str, str]) -> dict[str, str]:
     """Ask for the condition of each trial, where there are several."""
-    names = [Path(one["markers"]).stem for one in trials]
+    names = [Path(trial["markers"]).stem for trial in trials]
     if known or len(names) < 2:
         return {}
     answers = {name: typer.prompt(f"Condition of {name}", default="", show_default=False).strip() for name in names}
@@ -136,7 +138,7 @@ def _conditions(given: Sequence[str]) -> dict[str, str]:
     Raises:
         BadParameter: one lacks its trial or its name.
     """
-    pairs = [one.partition("=")[::2] for one in given]
+    pairs = [condition.partition("=")[::2] for condition in given]
     for (trial, name), text in zip(pairs, given, strict=True):
         if not trial.strip() or not name.strip():
             raise typer.BadParameter(f"'{text}' is no condition of a trial; write it as walk1=barefoot")
@@ -145,7 +147,7 @@ def _conditions(given: Sequence[str]) -> dict[str, str]:
 
 def _expect_trials(conditions: Mapping[str, str], trials: Sequence[Mapping[str, str]]) -> None:
     """Raise an error about a condition of a trial that is not in the folder."""
-    names = [Path(one["markers"]).stem for one in trials]
+    names = [Path(trial["markers"]).stem for trial in trials]
     if unknown := [trial for trial in conditions if trial not in names]:
         raise typer.BadParameter(f"there is no trial '{unknown[0]}'; trials are {', '.join(names)}")
 
@@ -194,7 +196,7 @@ def markers(
     out.print(f"{len(labels)} labels: {', '.join(labels)}", soft_wrap=True)
     table = plain_table("preset", "labels present", "absent")
     sets = {name: spelled_as(read_marker_set(name), labels) for name in preset_names()}
-    shares = {name: label_share(one, labels) for name, one in sets.items()}
+    shares = {name: label_share(marker_set, labels) for name, marker_set in sets.items()}
     presets = []
     for name in sorted(shares, key=lambda name: -shares[name]):
         wanted = sets[name].labels

@@ -52,7 +52,7 @@ def show_overview(overview: Overview, verbose: bool) -> None:
         show_all(overview.findings)
         return
     shown = [*reported(overview.findings), *in_order(overview.waived)]
-    groups = grouped(sorted(shown, key=lambda one: -one.severity))
+    groups = grouped(sorted(shown, key=lambda finding: -finding.severity))
     for group in groups[:_SHOWN]:
         _show_line(group)
     hidden = len(groups) - len(groups[:_SHOWN])
@@ -64,7 +64,7 @@ def show_overview(overview: Overview, verbose: bool) -> None:
 
 def show_all(findings: Sequence[Finding]) -> None:
     """Show every finding with effect, causes and remedy, and those that it explains below it."""
-    for group in grouped(in_order(one for one in findings if one.muted_by is None)):
+    for group in grouped(in_order(finding for finding in findings if finding.muted_by is None)):
         _show_line(group)
         first = group.first
         if first.severity is Severity.INFO:
@@ -78,11 +78,13 @@ def show_all(findings: Sequence[Finding]) -> None:
 def show_idle_waivers(codes: Sequence[str], findings: Sequence[Finding], stages: Sequence[str] = STAGES) -> None:
     """Show which codes of `--waive` had no effect, and why. Nothing is known of rules in other stages than these."""
     for code in codes:
-        found = [one for one in findings if one.code.startswith(code)]
-        later = any(rule(one).stage not in stages for one in matching(code))
-        had_effect = any(one.status == "waived" for one in found)
+        found = [finding for finding in findings if finding.code.startswith(code)]
+        later = any(rule(matched).stage not in stages for matched in matching(code))
+        had_effect = any(finding.status == "waived" for finding in found)
         if not had_effect and (found or not later):
-            why = dict.fromkeys(f"{one.code} is {_WHY_NOT[one.severity is Severity.ERROR]}" for one in found)
+            why = dict.fromkeys(
+                f"{finding.code} is {_WHY_NOT[finding.severity is Severity.ERROR]}" for finding in found
+            )
             out.print(f"note: --waive {code} has no effect: {', '.join(why) or 'it was not found'}", soft_wrap=True)
 
 
@@ -93,12 +95,12 @@ def waivers_reported(codes: Sequence[str]) -> Iterator[None]:
         yield
     except KinertiaError as error:
         found = findings_of(error)
-        show_idle_waivers([code for code in codes if any(one.code.startswith(code) for one in found)], found)
+        show_idle_waivers([code for code in codes if any(finding.code.startswith(code) for finding in found)], found)
         raise
 
 
-def _causes(one: Finding) -> str:
-    return f"Likely causes: {'; '.join(one.likely_causes)}." if one.likely_causes else ""
+def _causes(finding: Finding) -> str:
+    return f"Likely causes: {'; '.join(finding.likely_causes)}." if finding.likely_causes else ""
 
 
 def _show_line(group: Group) -> None:
@@ -207,7 +209,7 @@ def next_commands(error: KinertiaError, given: Path, model: Model, command: str)
         model: the model as stated in the subject file, or in options.
         command: the command that failed.
     """
-    if not _NO_MARKER_SET & {one.code for one in findings_of(error)}:
+    if not _NO_MARKER_SET & {finding.code for finding in findings_of(error)}:
         return []
     if model.static is None or model.markers is not None or model.osim is not None:
         return []
@@ -244,19 +246,19 @@ def explain(
     wanted = code.strip().upper()
     from kinertia.diagnostics.limits import with_limits  # loads all checks and readers
 
-    found = [with_limits(rule(one)) for one in matching(wanted)]
+    found = [with_limits(rule(matched)) for matched in matching(wanted)]
     if not found:
         raise SettingsError(_unknown(code))
     if len(wanted) == 4:
         _show_rule(found[0])
     else:
         _show_questions(found)
-    return Outcome([_content(one) for one in found])
+    return Outcome([_content(explained) for explained in found])
 
 
 def _unknown(code: str) -> str:
-    near = ", ".join(f"{one} ({rule(one).name})" for one in nearest(code.strip().upper()))
-    families = ", ".join(dict.fromkeys(one[0] for one in all_rules()))
+    near = ", ".join(f"{similar} ({rule(similar).name})" for similar in nearest(code.strip().upper()))
+    families = ", ".join(dict.fromkeys(rule_code[0] for rule_code in all_rules()))
     return f"there is no finding {code!r}; " + (f"nearest: {near}" if near else f"families: {families}")
 
 
@@ -265,38 +267,38 @@ def _show_questions(rules: Sequence[Rule]) -> None:
     family = rules[0].code[0]
     out.print(f"{family}  {family_title(family)}")
     asked = None
-    for one in rules:
-        if one.question != asked:
-            asked = one.question
-            out.print(f"\n{asked}  {one.asks}", style="bold", soft_wrap=True)
-        out.print(f"  {one.code}  {one.severity.lower():<9}  {one.name}", soft_wrap=True)
+    for shown in rules:
+        if shown.question != asked:
+            asked = shown.question
+            out.print(f"\n{asked}  {shown.asks}", style="bold", soft_wrap=True)
+        out.print(f"  {shown.code}  {shown.severity.lower():<9}  {shown.name}", soft_wrap=True)
     out.print(f"\nfor details of one: kinertia explain {rules[0].code}")
 
 
-def _show_rule(one: Rule) -> None:
-    out.print(f"{one.code}  {one.name}", style="bold", soft_wrap=True)
-    for heading, text in _lines(one):
+def _show_rule(shown: Rule) -> None:
+    out.print(f"{shown.code}  {shown.name}", style="bold", soft_wrap=True)
+    for heading, text in _lines(shown):
         _show_code(heading, text)
 
 
-def _lines(one: Rule) -> Iterator[tuple[str, str]]:
+def _lines(shown: Rule) -> Iterator[tuple[str, str]]:
     """Yield headings and sentences about a rule."""
-    yield "severity", severity_text(one)
-    yield "question", f"{one.question}  {one.asks}"
-    yield "message", outlined(one.message)
-    yield "detects", one.detects
-    yield "effect", outlined(one.effect)
-    for k, cause in enumerate(one.causes):
+    yield "severity", severity_text(shown)
+    yield "question", f"{shown.question}  {shown.asks}"
+    yield "message", outlined(shown.message)
+    yield "detects", shown.detects
+    yield "effect", outlined(shown.effect)
+    for k, cause in enumerate(shown.causes):
         yield "causes" if k == 0 else "", f"{k + 1}. {cause}"
-    yield "remedy", outlined(one.remedy)
-    if one.affects:
-        yield "affects", ", ".join(one.affects).replace("_", " ")
-    if one.supersedes:
-        yield "explains", ", ".join(one.supersedes)
-    if one.resolves:
-        yield "resolves", ", ".join(one.resolves)
-    yield "overrule", overruling(one)
-    yield "more", f"docs/{page(one.code)}"
+    yield "remedy", outlined(shown.remedy)
+    if shown.affects:
+        yield "affects", ", ".join(shown.affects).replace("_", " ")
+    if shown.supersedes:
+        yield "explains", ", ".join(shown.supersedes)
+    if shown.resolves:
+        yield "resolves", ", ".join(shown.resolves)
+    yield "overrule", overruling(shown)
+    yield "more", f"docs/{page(shown.code)}"
 
 
 def _show_code(heading: str, text: str) -> None:
@@ -306,25 +308,29 @@ def _show_code(heading: str, text: str) -> None:
     out.print(lines, soft_wrap=True)
 
 
-def severity_text(one: Rule) -> str:
+def severity_text(explained: Rule) -> str:
     """Describe severity, escalation and stage in words."""
-    return one.severity + (f"; {one.escalation}" if one.escalation else "") + f" ({one.stage} stage)"
+    return (
+        explained.severity
+        + (f"; {explained.escalation}" if explained.escalation else "")
+        + f" ({explained.stage} stage)"
+    )
 
 
-def overruling(one: Rule) -> str:
+def overruling(explained: Rule) -> str:
     """Describe whether and how a user may overrule a rule."""
-    ignored = f'ignore = ["{one.code}"] under [diagnostics] in the subject file leaves it out of the verdict'
-    if one.hard:
+    ignored = f'ignore = ["{explained.code}"] under [diagnostics] in the subject file leaves it out of the verdict'
+    if explained.hard:
         waived = "cannot be waived, since nothing can be computed"
     else:
         waived = (
-            f'--waive {one.code}, or waive = ["{one.code}"] under [diagnostics] in the subject file, lets the fit go '
-            "on; the outputs concerned are then at best to be used with care"
-        ) + ("; it cannot be waived where a file could not be read further" if one.by_readers else "")
-    if one.severity == "ERROR":
+            f'--waive {explained.code}, or waive = ["{explained.code}"] under [diagnostics] in the subject file, lets '
+            "the fit go on; the outputs concerned are then at best to be used with care"
+        ) + ("; it cannot be waived where a file could not be read further" if explained.by_readers else "")
+    if explained.severity == "ERROR":
         return waived
-    return f"{ignored}; as an ERROR: {waived}" if "ERROR" in one.escalation else ignored
+    return f"{ignored}; as an ERROR: {waived}" if "ERROR" in explained.escalation else ignored
 
 
-def _content(one: Rule) -> dict[str, Any]:
-    return asdict(one) | {"question": one.question, "asks": one.asks, "page": page(one.code)}
+def _content(explained: Rule) -> dict[str, Any]:
+    return asdict(explained) | {"question": explained.question, "asks": explained.asks, "page": page(explained.code)}

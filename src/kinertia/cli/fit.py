@@ -120,24 +120,24 @@ def fit(
         "--calibrate": calibrate or None,
     }
     runs = _runs(trials, output, options, method, overrule_of(waive))
-    for one in runs:
-        _expect_folder(one, overwrite)
+    for run in runs:
+        _expect_folder(run, overwrite)
     summaries, status = [], 0
-    for one in runs:
+    for run in runs:
         try:
-            with waivers_reported(one.overrule.waive):
-                result = _fitted(one)
+            with waivers_reported(run.overrule.waive):
+                result = _fitted(run)
         except KinertiaError as error:
             if len(runs) == 1:
                 raise
-            show_problem(error, f"{one.given}: ")
-            summaries.append({"folder": None, "file": str(one.given), **of_error(error)})
+            show_problem(error, f"{run.given}: ")
+            summaries.append({"folder": None, "file": str(run.given), **of_error(error)})
             status = 2
             continue
         status = max(status, int(result.overview.failed))
-        summaries.append({"folder": str(one.folder), **summary(result), "bsp": _bsp_rows(result)})
+        summaries.append({"folder": str(run.folder), **summary(result), "bsp": _bsp_rows(result)})
         if not quiet:
-            _show(result, one, verbose, shown_table)
+            _show(result, run, verbose, shown_table)
     return Outcome(summaries if len(runs) > 1 else summaries[0], status)
 
 
@@ -186,12 +186,12 @@ def _runs(
     ]
 
 
-def _expect_folder(one: _Run, overwrite: bool) -> None:
+def _expect_folder(run: _Run, overwrite: bool) -> None:
     """Raise an error, before any work, if the results of a run cannot or may not go to its folder."""
-    names = [trial.name for trial in one.wanted.trials]
+    names = [trial.name for trial in run.wanted.trials]
     several = len(names) > 1
     files = FIT_FILES if several else (*FIT_FILES, *TRIAL_FILES)
-    results_folder(one.folder, overwrite, names if several else (), files)
+    results_folder(run.folder, overwrite, names if several else (), files)
 
 
 def _show(fit: Fit, run: _Run, verbose: bool, tables: bool) -> None:
@@ -209,16 +209,16 @@ def _name(path: Path) -> str:
     return path.resolve().name if path.is_dir() else path.resolve().parent.name if path.stem == "subject" else path.stem
 
 
-def _fitted(one: _Run) -> Fit:
+def _fitted(run: _Run) -> Fit:
     """Fit one person and save the results in the folder."""
     with shown_progress() as progress:
         try:
-            result = fit_subject(one.wanted, progress, one.overrule)
+            result = fit_subject(run.wanted, progress, run.overrule)
         except KinertiaError as error:
-            for line in next_commands(error, one.given, one.wanted.model, one.command):
+            for line in next_commands(error, run.given, run.wanted.model, run.command):
                 error.add_note(line)
             raise
-    save_fit(result, one.folder, provenance_of(one.wanted, one.command), force=True)
+    save_fit(result, run.folder, provenance_of(run.wanted, run.command), force=True)
     return result
 
 
@@ -232,7 +232,7 @@ def _command(trial: Path, options: dict[str, Any], method: str | None, output: P
 def _words(name: str, value: Any) -> list[Any]:
     """Return an option as it is typed."""
     if isinstance(value, tuple):
-        return [word for each in value for word in (name, each)]
+        return [word for value_word in value for word in (name, value_word)]
     return [name] if value is True else [name, value]
 
 

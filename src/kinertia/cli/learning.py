@@ -51,14 +51,14 @@ def results_of_people(results: list[Path]) -> list[PersonResults]:
             found.append(PersonResults(path))
         elif people := sorted(path.glob(f"people/*/{FIT_FILE}")):
             listed = fitted_people(path)
-            for folder in (one.parent for one in people):
+            for folder in (file.parent for file in people):
                 if listed is None or inert(folder.name) in listed:
                     found.append(PersonResults(folder, folder.name))
                 else:
                     older = "has no current results according to people.csv, only older ones"
                     out.print(f"left out: {folder.name}: {older}", soft_wrap=True)
         elif people := sorted(path.glob(f"*/{FIT_FILE}")):
-            found += [PersonResults(one.parent) for one in people]
+            found += [PersonResults(file.parent) for file in people]
         else:
             raise FileError(path, "holds no results of kinertia cohort or kinertia fit")
     return list(dict.fromkeys(found))
@@ -116,23 +116,23 @@ def _read(results: list[PersonResults], without: set[str]) -> tuple[list[PersonI
     files: list[str] = []
     met = set()
     with shown_progress() as progress:
-        for k, one in enumerate(results):
+        for k, results_of_person in enumerate(results):
             progress("reading", k / len(results))
-            saved = read_saved(one.folder)
-            if names := {saved.fit.subject.name, one.folder.name} & without:
+            saved = read_saved(results_of_person.folder)
+            if names := {saved.fit.subject.name, results_of_person.folder.name} & without:
                 met |= names
                 continue
-            own = _recordings(saved)
-            if twice := set(own) & set(files):
+            recorded = _recordings(saved)
+            if twice := set(recorded) & set(files):
                 problem = f"{len(twice)} of its files also belong to another person here; give each once"
-                raise PriorError(f"{one.folder}: {problem}")
+                raise PriorError(f"{results_of_person.folder}: {problem}")
             try:
                 person = information_of(saved.fit)
-                people.append(replace(person, name=one.name or person.name))
+                people.append(replace(person, name=results_of_person.name or person.name))
             except KinertiaError as error:
                 out.print(f"left out: {error}", soft_wrap=True)
                 continue
-            files += own
+            files += recorded
     if lost := without - met:
         raise PriorError(f"nobody is called {', '.join(sorted(lost))} here")
     return people, tuple(files)
@@ -250,15 +250,15 @@ def instruments(
     kinertia instruments anna/subject.toml ben/subject.toml -o instruments.toml
     """
     wanted = [_wanted(path) for path in subjects]
-    for path, each in zip(subjects, wanted, strict=True):
-        if each.instruments != wanted[0].instruments:
+    for path, subject in zip(subjects, wanted, strict=True):
+        if subject.instruments != wanted[0].instruments:
             raise SessionError(f"{path}: [instruments] differs from that of {subjects[0]}; it is the session's")
     own_file(output, expect_session, "kinertia instruments")
     people = []
-    for each in wanted:
+    for subject in wanted:
         with shown_progress() as progress:
-            fit = fit_subject(each, progress)
-        people.append(person_instruments(fit, recordings(each)))
+            fit = fit_subject(subject, progress)
+        people.append(person_instruments(fit, recordings(subject)))
     session = session_instruments(people, wanted[0].instruments)
     write_then_rename(output, session_text(output.name, VERSION, session.found, session.people))
     _show_instruments(session)
@@ -268,8 +268,8 @@ def instruments(
         {
             "file": str(output),
             "people": names,
-            "found": [asdict(one) for one in session.errors],
-            "findings": [one.to_dict() for one in session.contradictions],
+            "found": [asdict(error) for error in session.errors],
+            "findings": [contradiction.to_dict() for contradiction in session.contradictions],
         }
     )
 
@@ -280,8 +280,8 @@ def _wanted(path: Path) -> SubjectFile:
         raise FileError(path, "expected a subject file (.toml); kinertia init FOLDER drafts one of a person's files")
     wanted = read_subject(path)
     check_plates(wanted)
-    own = InstrumentsFiles.model_validate({**wanted.instruments.model_dump(), "session": None})
-    return wanted.model_copy(update={"instruments": own})
+    table = InstrumentsFiles.model_validate({**wanted.instruments.model_dump(), "session": None})
+    return wanted.model_copy(update={"instruments": table})
 
 
 def _show_instruments(session: SessionInstruments) -> None:

@@ -119,7 +119,7 @@ def _print_bodies(fits: dict[str, Fit]) -> None:
     out.print("Body segment parameters, which do not show whether joint moments changed:")
     for name, other in others:
         compared = differences(first, other)
-        changed = [f"{one.parameter} of {one.segment}" for one in compared if one.changed]
+        changed = [f"{difference.parameter} of {difference.segment}" for difference in compared if difference.changed]
         sentence = outcome_of(compared)
         if changed:
             sentence += f" ({', '.join(changed[:6])}{', ...' if changed[6:] else ''})"
@@ -201,7 +201,7 @@ def score_text(degrees: float) -> str:
 
 def _norms_for(fit: Fit, curves: CurvesByStage, path: Path) -> tuple[dict[str, Norm], list[str]]:
     """Read the norms in a file, and list those for which this fit has no curve."""
-    norms, known = read_norms(path), {one.quantity for one in curves["estimate"]}
+    norms, known = read_norms(path), {curve.quantity for curve in curves["estimate"]}
     check_convention(fit, norms)
     other = sorted(set(norms) - known)
     if len(other) == len(norms):

@@ -50,7 +50,7 @@ def _end(status: object) -> None:
     """End this process without freeing every object first, unless something else is at work in it."""
     from kinertia.motion.workload import THREAD
 
-    at_work = [each for each in threading.enumerate() if not each.name.startswith(THREAD)]
+    at_work = [thread for thread in threading.enumerate() if not thread.name.startswith(THREAD)]
     if len(at_work) > 1 or not isinstance(status, int):
         return
     atexit._run_exitfuncs()

@@ -116,7 +116,7 @@ class RecordingContext(MarkerContext):
     def contacts(self) -> Sequence[PlateContact]:
         """Every other load on a plate, with its position relative to the feet; none without plates or feet."""
         strays = set(map(id, self.stray_contacts))
-        return [one for one in self._all_contacts if id(one) not in strays]
+        return [contact for contact in self._all_contacts if id(contact) not in strays]
 
     @cached_property
     def shows_whole_feet(self) -> bool:
@@ -143,14 +143,14 @@ class RecordingContext(MarkerContext):
     @cached_property
     def whole_contacts(self) -> Sequence[PlateContact]:
         """`contacts` of feet whose whole load is on their plate, with little of the foot beyond its edge."""
-        far = [one for one in self.overhangs if one.overhang_m > LITTLE_BEYOND_M]
+        far = [reach for reach in self.overhangs if reach.overhang_m > LITTLE_BEYOND_M]
         return [
-            one
-            for one in self.contacts
+            contact
+            for contact in self.contacts
             if not any(
-                (other.plate, other.foot) == (one.plate, one.foot)
-                and one.time[0] <= other.span_s[1]
-                and other.span_s[0] <= one.time[-1]
+                (other.plate, other.foot) == (contact.plate, contact.foot)
+                and contact.time[0] <= other.span_s[1]
+                and other.span_s[0] <= contact.time[-1]
                 for other in far
             )
         ]
@@ -159,7 +159,7 @@ class RecordingContext(MarkerContext):
     def whole_loads(self) -> PlateLoads | None:
         """The plates without the loads that are not among `whole_contacts`."""
         plates, whole = self.plates, set(map(id, self.whole_contacts))
-        partly = [one for one in self.contacts if id(one) not in whole]
+        partly = [contact for contact in self.contacts if id(contact) not in whole]
         return None if plates is None else without_loads(plates, partly, self.whole_contacts)
 
     @cached_property
@@ -208,9 +208,14 @@ class RecordingContext(MarkerContext):
         """The trial without frames in which a foot bears load beyond its plate, or both feet or another person share
         one, unless the user vouches for a window; None where it is impossible, or hardly any frames are left.
         """
-        beyond = [(one.unmeasured_s, one.foot) for one in self.overhangs if one.unmeasured_s is not None]
-        foreign = [((one.time[0], one.time[-1]), one.foot) for one in self.foreign_contacts]
-        return self._without([*beyond, *foreign, *((one.unknown_s, slice(None)) for one in self.shared_loads)])
+        beyond = [(reach.unmeasured_s, reach.foot) for reach in self.overhangs if reach.unmeasured_s is not None]
+        foreign = [
+            ((foreign_contact.time[0], foreign_contact.time[-1]), foreign_contact.foot)
+            for foreign_contact in self.foreign_contacts
+        ]
+        return self._without(
+            [*beyond, *foreign, *((shared_load.unknown_s, slice(None)) for shared_load in self.shared_loads)]
+        )
 
     def _without(self, spans: Iterable[tuple[tuple[float, float], int | slice]]) -> Trial | None:
         trial = self.trial
@@ -240,8 +245,8 @@ class RecordingContext(MarkerContext):
             return ()
         start_s, end_s = self.foreign_load.span_s
         most = int(np.argmax(self.plates.force[within(self.plates.time, start_s, end_s), :, 1].mean(axis=0)))
-        own = [one for one in self.contacts if one.plate == most]
-        return [one for one in own if one.time[0] <= end_s and one.time[-1] >= start_s]
+        on_most_used = [contact for contact in self.contacts if contact.plate == most]
+        return [contact for contact in on_most_used if contact.time[0] <= end_s and contact.time[-1] >= start_s]
 
     @cached_property
     def adult_share(self) -> float:
@@ -283,7 +288,7 @@ class RecordingContext(MarkerContext):
     @cached_property
     def plate_masses(self) -> Mapping[str, float]:
         """Body mass (kg) from each plate that supports all of it for a while; empty if loads are not sorted by foot."""
-        trial = self._without((one.unknown_s, slice(None)) for one in self.shared_loads)
+        trial = self._without((load.unknown_s, slice(None)) for load in self.shared_loads)
         if self.plates is None or trial is None:
             return {}
         return plate_masses(self.plates, trial, self.all_markers, self.segment_of_label)
@@ -292,13 +297,13 @@ class RecordingContext(MarkerContext):
     def plates_reached_beyond(self) -> frozenset[str]:
         """Names of plates that a foot exceeds so far that part of its load is elsewhere."""
         names = () if self.plates is None else self.plates.names
-        return frozenset(names[one.plate] for one in self.overhangs if one.overhang_m > LITTLE_BEYOND_M)
+        return frozenset(names[overhang.plate] for overhang in self.overhangs if overhang.overhang_m > LITTLE_BEYOND_M)
 
     @property
     def whole_plate_masses(self) -> Mapping[str, float]:
         """`plate_masses` of plates that bear all of the person and no one else."""
         names = () if self.plates is None else self.plates.names
-        other = self.plates_reached_beyond | {names[one.plate] for one in self.foreign_contacts}
+        other = self.plates_reached_beyond | {names[foreign.plate] for foreign in self.foreign_contacts}
         return {name: kg for name, kg in self.plate_masses.items() if name not in other}
 
 
@@ -343,8 +348,8 @@ class PersonContext:
     def has_error(self, trial: str, *codes: str) -> bool:
         """Return whether an ERROR of one of these codes, questions or families was found in a trial."""
         return any(
-            one.severity is Severity.ERROR and one.where.trial == trial and one.code.startswith(codes)
-            for one in self.found
+            finding.severity is Severity.ERROR and finding.where.trial == trial and finding.code.startswith(codes)
+            for finding in self.found
         )
 
 

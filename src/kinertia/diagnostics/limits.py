@@ -66,20 +66,20 @@ REPORTED_ELSEWHERE: Mapping[str, Mapping[str, Limit]] = {
 _NAME = re.compile(r"\{(\w+)(?:\.(usual|least|most))?(?::([%]))?\}")
 
 
-def with_limits(one: Rule) -> Rule:
+def with_limits(rule: Rule) -> Rule:
     """Return a rule whose texts have its limits in place of their names.
 
     >>> from kinertia.findings.rule import rule
     >>> with_limits(rule("P245")).detects
     'Centres of pressure outside the corners of the plate for more than 5 % of the load.'
     """
-    limits = limits_of(one.code)
-    return replace(one, detects=_rendered(one.detects, limits), escalation=_rendered(one.escalation, limits))
+    limits = limits_of(rule.code)
+    return replace(rule, detects=_rendered(rule.detects, limits), escalation=_rendered(rule.escalation, limits))
 
 
-def names_in(one: Rule) -> set[str]:
+def names_in(rule: Rule) -> set[str]:
     """Return the names of limits in the texts of a rule."""
-    return {match.group(1) for text in (one.detects, one.escalation) for match in _NAME.finditer(text)}
+    return {match.group(1) for text in (rule.detects, rule.escalation) for match in _NAME.finditer(text)}
 
 
 @cache
@@ -90,7 +90,7 @@ def limits_of(code: str) -> Mapping[str, Limit]:
         ValueError: two checks have different limits of that name.
     """
     result: dict[str, Limit] = {}
-    declared = [one.limits for one in ALL_CHECKS if code in one.codes]
+    declared = [check.limits for check in ALL_CHECKS if code in check.codes]
     for limits in (*declared, REPORTED_ELSEWHERE.get(code, {})):
         for name, limit in limits.items():
             if result.setdefault(name, limit) != limit:

@@ -148,7 +148,10 @@ class MarkerContext:
         if self.marker_set is None:
             return None
         present = set(self.recording.markers.labels)
-        feet = {side: [one for one in own if one in present] for side, own in self.marker_set.foot_labels().items()}
+        feet = {
+            side: [label for label in labels if label in present]
+            for side, labels in self.marker_set.foot_labels().items()
+        }
         return feet if all(feet.values()) else None
 
     @cached_property

@@ -78,12 +78,12 @@ def asked(
         trial: name of the trial for findings that state none.
     """
     result: list[Finding] = []
-    for one in in_order(tuple(checks)):
-        errors = {each.code for each in (*found, *result) if each.severity is Severity.ERROR}
-        if any(code.startswith(one.unless) for code in errors):
+    for next_check in in_order(tuple(checks)):
+        errors = {known.code for known in (*found, *result) if known.severity is Severity.ERROR}
+        if any(code.startswith(next_check.unless) for code in errors):
             continue
-        for each in one(context):
-            result.append(each if trial is None or each.where.trial is not None else each.in_trial(trial))
+        for reported in next_check(context):
+            result.append(reported if trial is None or reported.where.trial is not None else reported.in_trial(trial))
     return result
 
 
@@ -96,9 +96,9 @@ def in_order(checks: tuple[Check[Any], ...]) -> tuple[Check[Any], ...]:
     """
     left, result = list(checks), []
     while left:
-        first = next((one for one in left if not any(one.needs(other) for other in left)), None)
+        first = next((candidate for candidate in left if not any(candidate.needs(other) for other in left)), None)
         if first is None:
-            raise ValueError(f"checks need one another: {', '.join('/'.join(one.codes) for one in left)}")
+            raise ValueError(f"checks need one another: {', '.join('/'.join(unordered.codes) for unordered in left)}")
         left.remove(first)
         result.append(first)
     return tuple(result)
@@ -106,15 +106,15 @@ def in_order(checks: tuple[Check[Any], ...]) -> tuple[Check[Any], ...]:
 
 def added_checks() -> tuple[Check[Any], ...]:
     """Return the checks of recordings that installed packages add."""
-    families = [one for one in names(RULES) if one not in FAMILIES]
+    families = [name for name in names(RULES) if name not in FAMILIES]
     return tuple(
-        Check((code,), ask) for one in families for code, ask in loaded(RULES, one).recording_questions.items()
+        Check((code,), ask) for family in families for code, ask in loaded(RULES, family).recording_questions.items()
     )
 
 
 def rules_of(*checks: Check[Any]) -> int:
     """Count the rules that these checks cover."""
-    return len({each for one in checks for code in one.codes for each in matching(code)})
+    return len({matched for ran in checks for code in ran.codes for matched in matching(code)})
 
 
 def explained(findings: Iterable[Finding], left_out: Collection[str] = ()) -> list[Finding]:
@@ -127,11 +127,11 @@ def explained(findings: Iterable[Finding], left_out: Collection[str] = ()) -> li
         left_out: names of trials that are not in the result: what is found in them explains nothing elsewhere.
     """
     unique: dict[tuple[str, Where], Finding] = {}
-    for one in findings:
-        unique.setdefault((one.code, one.where), one)
+    for finding in findings:
+        unique.setdefault((finding.code, finding.where), finding)
     result = list(unique.values())
     causes = _causes(result, left_out)
-    severities = [one.severity for one in result]
+    severities = [finding.severity for finding in result]
     for j in causes:
         last, first = j, causes[j][0]
         while first in causes:
@@ -139,15 +139,15 @@ def explained(findings: Iterable[Finding], left_out: Collection[str] = ()) -> li
         for k in causes[last]:
             if result[k].code == result[first].code:
                 severities[k] = max(severities[k], result[j].severity)
-    result = [one.at(severity) for one, severity in zip(result, severities, strict=True)]
+    result = [finding.at(severity) for finding, severity in zip(result, severities, strict=True)]
     resolved = _resolve(result, causes)
     return [
         replace(
-            one,
-            severity=Severity.CORRECTED if j in resolved else one.severity,
+            finding,
+            severity=Severity.CORRECTED if j in resolved else finding.severity,
             muted_by=result[causes[j][0]].code if j in causes else None,
         )
-        for j, one in enumerate(result)
+        for j, finding in enumerate(result)
     ]
 
 
@@ -155,7 +155,7 @@ def _causes(findings: Sequence[Finding], left_out: Collection[str]) -> dict[int,
     """Return which findings explain each, by their places in the list; without circles, as `supersedes` has none."""
     causes: dict[int, list[int]] = {}
     for k, cause in enumerate(findings):
-        consequences = {code for each in cause.rule.supersedes for code in matching(each)}
+        consequences = {code for superseded in cause.rule.supersedes for code in matching(superseded)}
         for j, other in enumerate(findings):
             is_here = cause.where.trial not in left_out or cause.where.trial == other.where.trial
             if j != k and other.code in consequences and is_here and cause.where.overlaps(other.where):
@@ -169,13 +169,13 @@ def _resolve(findings: Sequence[Finding], causes: dict[int, list[int]]) -> set[i
     A correction that such a warning explains, directly or through others, is explained no more: no circle is possible.
     """
     resolved = set()
-    for j, one in enumerate(findings):
-        if one.severity is not Severity.WARNING or j in causes:
+    for j, consequence in enumerate(findings):
+        if consequence.severity is not Severity.WARNING or j in causes:
             continue
         for k, correction in enumerate(findings):
-            codes = {code for each in correction.rule.resolves for code in matching(each)}
-            is_correction = correction.severity is Severity.CORRECTED and correction.where.overlaps(one.where)
-            if one.code in codes and is_correction:
+            codes = {code for resolvable in correction.rule.resolves for code in matching(resolvable)}
+            is_correction = correction.severity is Severity.CORRECTED and correction.where.overlaps(consequence.where)
+            if consequence.code in codes and is_correction:
                 if _first_cause(k, causes) == j:
                     del causes[k]
                 causes[j] = [k]
@@ -203,34 +203,39 @@ def overruled(
         of_trials: what the user overrules in single trials, by name.
     """
     result = []
-    for one in findings:
-        given = overrule + (of_trials or {}).get(one.where.trial or "", Overrule())
-        is_error = one.severity is Severity.ERROR
+    for finding in findings:
+        given = overrule + (of_trials or {}).get(finding.where.trial or "", Overrule())
+        is_error = finding.severity is Severity.ERROR
         codes = given.waive if is_error else given.ignore
-        if not any(one.code.startswith(code) for code in codes) or (is_error and one.rule.hard):
-            result.append(replace(one, status="open"))
+        if not any(finding.code.startswith(code) for code in codes) or (is_error and finding.rule.hard):
+            result.append(replace(finding, status="open"))
         else:
-            result.append(replace(one, status="waived" if is_error else "ignored", reason=given.reason(one.code)))
+            result.append(
+                replace(finding, status="waived" if is_error else "ignored", reason=given.reason(finding.code))
+            )
     return _released(result)
 
 
 def _released(findings: list[Finding]) -> list[Finding]:
     """Return the findings, those ERRORs open that cannot be waived and that only waived ones explain."""
-    if all(one.status != "waived" for one in findings):
+    if all(finding.status != "waived" for finding in findings):
         return findings
-    hard = [one for one in findings if one.severity is Severity.ERROR and one.rule.hard]
-    open_ = explained(replace(one, muted_by=None) for one in findings if one.is_open or one in hard)
-    muted_by = {(one.code, one.where): one.muted_by for one in open_}
-    return [replace(one, muted_by=muted_by[one.code, one.where]) if one in hard else one for one in findings]
+    hard = [finding for finding in findings if finding.severity is Severity.ERROR and finding.rule.hard]
+    open_ = explained(replace(finding, muted_by=None) for finding in findings if finding.is_open or finding in hard)
+    muted_by = {(finding.code, finding.where): finding.muted_by for finding in open_}
+    return [
+        replace(finding, muted_by=muted_by[finding.code, finding.where]) if finding in hard else finding
+        for finding in findings
+    ]
 
 
 def blocking(findings: Iterable[Finding]) -> list[Finding]:
     """Return open ERRORs that no other finding explains; they stop the next stage."""
-    return [one for one in findings if one.severity is Severity.ERROR and one.is_open]
+    return [finding for finding in findings if finding.severity is Severity.ERROR and finding.is_open]
 
 
 def unknown_codes(overrule: Overrule) -> list[str]:
     """Return entries that are no code, question or family of the catalogue, or cannot be waived."""
-    unknown = [each for each in (*overrule.waive, *overrule.ignore) if not matching(each)]
-    hard = [each for each in overrule.waive if len(each) == 4 and matching(each) and rule(each).hard]
+    unknown = [code for code in (*overrule.waive, *overrule.ignore) if not matching(code)]
+    hard = [code for code in overrule.waive if len(code) == 4 and matching(code) and rule(code).hard]
     return [*unknown, *hard]

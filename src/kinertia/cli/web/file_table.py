@@ -68,9 +68,9 @@ def _kind(file: Path, capture: bool, captures: Sequence[Path]) -> tuple[str, tup
     if has_force_columns(file):
         of_static = " of a static trial, by its name: not needed (only its markers are used)"
         what = f"forces{of_static if STATIC_NAME.search(file.stem) else ''}"
-        return what, (*((f"forces:{one.name}", f"forces of {one.name}") for one in captures), unused)
+        return what, (*((f"forces:{forces.name}", f"forces of {forces.name}") for forces in captures), unused)
     if holds_loads(file):
-        named = ((f"loads:{one.name}", f"explains the forces of {one.name}") for one in captures)
+        named = ((f"loads:{forces.name}", f"explains the forces of {forces.name}") for forces in captures)
         return "meaning of the force columns (ExternalLoads)", (*named, unused)
     if suffix == ".osim":
         return "OpenSim model", (("osim", "model, in place of a static trial"), unused)
@@ -112,12 +112,12 @@ def with_uses(content: Content, uses: Mapping[str, str]) -> Content:
     for use, names in by_use.items():
         if len(names) > 1 and use not in ("trial", NOT_USED):
             what, _, trial_name = use.partition(":")
-            of = f" of {trial_name}" if trial_name else ""
-            raise SettingsError(f"{' and '.join(names)} are both used as {what}{of}; choose one of them")
+            whose = f" of {trial_name}" if trial_name else ""
+            raise SettingsError(f"{' and '.join(names)} are both used as {what}{whose}; choose one of them")
     model = {key: value for key, value in _table(content, "model").items() if key not in ("static", "osim")}
     if model.get("markers") not in preset_names():
         model.pop("markers", None)
-    model |= {key: own[0] for key in _MODEL_FILES if (own := by_use.get(key))}
+    model |= {key: chosen[0] for key in _MODEL_FILES if (chosen := by_use.get(key))}
     if "osim" in model:
         model = {key: value for key, value in model.items() if key not in ("static", "markers", "length_unit")}
     else:
@@ -128,14 +128,14 @@ def with_uses(content: Content, uses: Mapping[str, str]) -> Content:
         trial = {"markers": markers, **known.get(markers, {})}
         for key in ("forces", "loads"):
             trial.pop(key, None)
-            if own := by_use.get(f"{key}:{markers}"):
-                trial[key] = own[0]
+            if chosen := by_use.get(f"{key}:{markers}"):
+                trial[key] = chosen[0]
         trials.append(trial)
     changed = {**content, "model": model, "trial": trials}
     if not trials:
         del changed["trial"]
     prior = {key: value for key, value in _table(content, "prior").items() if key not in _PRIOR_FILES}
-    prior |= {key: own[0] for key in _PRIOR_FILES if (own := by_use.get(key))}
+    prior |= {key: chosen[0] for key in _PRIOR_FILES if (chosen := by_use.get(key))}
     return {**changed, "prior": prior} if prior else {key: changed[key] for key in changed if key != "prior"}
 
 
@@ -149,7 +149,7 @@ def put_aside(before: Content, after: Content, aside: Iterable[Content]) -> list
 def taken_up(content: Content, uses: Mapping[str, str], aside: Iterable[Content]) -> tuple[Content, dict[str, str]]:
     """Restore entries and uses of trials that are used again from those put aside; files with another use keep it."""
     used = {str(trial.get("markers")) for trial in _trials(content)}
-    back = [one for one in aside if uses.get(str(one.get("markers"))) == "trial" and one["markers"] not in used]
+    back = [trial for trial in aside if uses.get(str(trial.get("markers"))) == "trial" and trial["markers"] not in used]
     given = set(uses.values())
     free = {name: use for name, use in uses_of({"trial": back}).items() if use not in given}
     again = {name: free.get(name, use) if use == NOT_USED else use for name, use in uses.items()}
@@ -178,7 +178,7 @@ def within_folder(content: Content) -> Content:
         if isinstance(entries := content.get(name), Mapping):
             changed[name] = _by_names_only(entries, keys)
         elif isinstance(entries, list):
-            changed[name] = [_by_names_only(one, keys) if isinstance(one, Mapping) else one for one in entries]
+            changed[name] = [_by_names_only(entry, keys) if isinstance(entry, Mapping) else entry for entry in entries]
     return changed
 
 
@@ -216,4 +216,4 @@ def _table(content: Content, name: str) -> Mapping[str, Any]:
 
 def _trials(content: Content) -> list[Mapping[str, Any]]:
     value = content.get("trial")
-    return [one for one in value if isinstance(one, Mapping)] if isinstance(value, list) else []
+    return [trial for trial in value if isinstance(trial, Mapping)] if isinstance(value, list) else []

@@ -78,7 +78,7 @@ def marker_positions(person: PersonFolder) -> MarkerPositions:
     wanted = _named_set(person, model)
     match, used = match_labels(markers.labels, wanted)
     if used is not None:
-        places = {name: dict(_owners(own)) for name, own in (("s", used.segments), ("l", used.landmarks))}
+        places = {name: dict(_owners(letters)) for name, letters in (("s", used.segments), ("l", used.landmarks))}
     else:
         placed = places_of(recording)
         places = {"s": dict(_owners(placed.segments)), "l": dict(_owners(placed.landmarks))}

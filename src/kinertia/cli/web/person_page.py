@@ -137,7 +137,7 @@ def person_page(
         uses={row.name: (typed or {}).get(USE + row.name, row.use) for row in rows},
         fields=fields(dict(content), typed),
         marker_set=marker_set_field(dict(content), typed),
-        more={each.kind: each for each in rows_of(dict(content), typed)},
+        more={table.kind: table for table in rows_of(dict(content), typed)},
         segments=SEGMENTS,
         text=person.subject.read_text(encoding="utf-8", errors="replace") if person.subject.is_file() else "",
         text_typed=text_typed,
@@ -162,7 +162,7 @@ def _outcomes(person: PersonFolder) -> dict[str, Any]:
     checked, results = (_known(person.outcome(kind)) for kind in ("check", "results"))
     fitted = results if person.fitted else {}
     pages = {"results/report.html": fitted, "check/check.html": checked}
-    latest = [(page, one) for page, one in pages.items() if one and one.get("inputs") == person.inputs]
+    latest = [(page, outcome) for page, outcome in pages.items() if outcome and outcome.get("inputs") == person.inputs]
     return {
         "latest": {"purposes": [], "steps": [], **_with_buttons(latest[0][1]), "page": latest[0][0]} if latest else {},
         "compared": person.outcome("comparison"),
@@ -179,13 +179,16 @@ def _outcomes(person: PersonFolder) -> dict[str, Any]:
 def _with_buttons(outcome: Mapping[str, Any]) -> dict[str, Any]:
     """Return an outcome whose findings have buttons; those after the steps that come first are `others`."""
     shown = {
-        kind: [{**one, "buttons": [Button.of(each) for each in one.get("settings", [])]} for one in outcome[kind]]
+        kind: [
+            {**finding, "buttons": [Button.of(setting) for setting in finding.get("settings", [])]}
+            for finding in outcome[kind]
+        ]
         for kind in ("steps", "findings")
     }
     return {
         **outcome,
         "steps": shown["steps"],
-        "others": [one for one in shown["findings"] if one not in shown["steps"]],
+        "others": [finding for finding in shown["findings"] if finding not in shown["steps"]],
     }
 
 
@@ -260,7 +263,7 @@ def make_norms(people: Sequence[PersonFolder], library: Library) -> None:
     for person in people:
         saved = read_saved(person.results)
         files = {} if saved.provenance is None else dict.fromkeys(saved.provenance.files.values(), person.name)
-        if again := [seen[one] for one in files if one in seen]:
+        if again := [seen[file] for file in files if file in seen]:
             raise KinertiaError(f"{person.name} and {again[0]} share recordings: choose each control once")
         seen |= files
         controls.append(Control.of(saved.fit))

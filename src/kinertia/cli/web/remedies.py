@@ -69,7 +69,7 @@ def apply(person: PersonFolder, text: str, reason: str) -> None:
     Raises:
         SettingsError: no finding proposes it, or it overrules one without a reason.
     """
-    remedy = next((one for one in _proposed(person) if one.text == text), None)
+    remedy = next((proposed for proposed in _proposed(person) if proposed.text == text), None)
     if remedy is None:
         raise SettingsError("This remedy is of an earlier check: look at the findings again")
     why = " ".join(reason.split())[:_LONGEST_REASON]
@@ -78,32 +78,32 @@ def apply(person: PersonFolder, text: str, reason: str) -> None:
     content = entries(person)
     before = _now(content, remedy)
     _write(person, content, _with(content, remedy, remedy.value, why))
-    noted = [one for one in person.notes().get(_NOTES, []) if Remedy(**one["remedy"]) != remedy]
+    noted = [note for note in person.notes().get(_NOTES, []) if Remedy(**note["remedy"]) != remedy]
     person.note(**{_NOTES: [*noted, {"remedy": remedy.to_dict(), "before": before, "reason": why}]})
 
 
 def undo(person: PersonFolder, text: str) -> None:
     """Restore what stood in place of an applied setting."""
     noted = person.notes().get(_NOTES, [])
-    for one in noted:
-        remedy = Remedy(**one["remedy"])
+    for note in noted:
+        remedy = Remedy(**note["remedy"])
         if remedy.text == text:
             content = entries(person)
-            _write(person, content, _with(content, remedy, one["before"], ""))
-    person.note(**{_NOTES: [one for one in noted if Remedy(**one["remedy"]).text != text]})
+            _write(person, content, _with(content, remedy, note["before"], ""))
+    person.note(**{_NOTES: [note for note in noted if Remedy(**note["remedy"]).text != text]})
 
 
 def applied(person: PersonFolder, content: Content) -> list[Applied]:
     """Return the applied remedies that the subject file still has."""
-    found = [(Remedy(**one["remedy"]), one["reason"]) for one in person.notes().get(_NOTES, [])]
+    found = [(Remedy(**note["remedy"]), note["reason"]) for note in person.notes().get(_NOTES, [])]
     return [Applied(remedy.text, reason) for remedy, reason in found if _now(content, remedy) == remedy.value]
 
 
 def _proposed(person: PersonFolder) -> Iterator[Remedy]:
     for kind in ("results", "check"):
         outcome = person.outcome(kind)
-        for one in outcome.get("findings", []) if outcome.get("inputs") == person.inputs else []:
-            yield from (Remedy(**each) for each in one.get("settings", []))
+        for finding in outcome.get("findings", []) if outcome.get("inputs") == person.inputs else []:
+            yield from (Remedy(**setting) for setting in finding.get("settings", []))
 
 
 def _write(person: PersonFolder, before: Content, after: Content) -> None:
@@ -114,17 +114,17 @@ def _write(person: PersonFolder, before: Content, after: Content) -> None:
 
 def _trials(content: Content) -> list[dict[str, Any]]:
     trials = content.get("trial")
-    return [dict(one) for one in trials if isinstance(one, Mapping)] if isinstance(trials, list) else []
+    return [dict(trial) for trial in trials if isinstance(trial, Mapping)] if isinstance(trials, list) else []
 
 
 def _now(content: Content, remedy: Remedy) -> Any:
     """Return what stands in place of a setting: its value, or the whole trial; None for nothing."""
-    own: Any = content
+    holder: Any = content
     if remedy.trial:
-        own = next((one for one in _trials(content) if trial_name(one) == remedy.trial), None)
-        if own is None or not remedy.key:
-            return own
-    table = own if remedy.table == "trial" else own.get(remedy.table, {})
+        holder = next((trial for trial in _trials(content) if trial_name(trial) == remedy.trial), None)
+        if holder is None or not remedy.key:
+            return holder
+    table = holder if remedy.table == "trial" else holder.get(remedy.table, {})
     if not remedy.overrules:
         return table.get(remedy.key)
     return remedy.value if remedy.value in table.get(remedy.key, []) else None
@@ -135,13 +135,13 @@ def _with(content: Content, remedy: Remedy, value: Any, reason: str) -> Content:
     if not remedy.trial:
         return _in_table(content, remedy, value, reason)
     trials = []
-    for one in _trials(content):
-        if trial_name(one) != remedy.trial:
-            trials.append(one)
+    for trial in _trials(content):
+        if trial_name(trial) != remedy.trial:
+            trials.append(trial)
         elif remedy.overrules:
-            trials.append(_in_table(one, remedy, value, reason))
+            trials.append(_in_table(trial, remedy, value, reason))
         elif remedy.key:
-            trials.append(_set(one, remedy.key, value))
+            trials.append(_set(trial, remedy.key, value))
     if not remedy.key and value is not None:
         trials.append(value)
     return _set(content, "trial", trials or None)
@@ -154,8 +154,8 @@ def _in_table(content: Content, remedy: Remedy, value: Any, reason: str) -> Cont
         needed = changed or remedy.table == "model"  # which every subject file has
         return _set(content, remedy.table, changed if needed else None)
     code = remedy.value
-    codes = [one for one in table.get(remedy.key, []) if one != code] + ([] if value is None else [code])
-    reasons = {one: why for one, why in table.get("reasons", {}).items() if one != code}
+    codes = [listed for listed in table.get(remedy.key, []) if listed != code] + ([] if value is None else [code])
+    reasons = {listed: why for listed, why in table.get("reasons", {}).items() if listed != code}
     table = _set(table, remedy.key, codes or None)
     table = _set(table, "reasons", {**reasons, **({code: reason} if value is not None else {})} or None)
     return _set(content, DIAGNOSTICS, table or None)
@@ -163,5 +163,5 @@ def _in_table(content: Content, remedy: Remedy, value: Any, reason: str) -> Cont
 
 def _set(table: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:
     if value is None:
-        return {name: each for name, each in table.items() if name != key}
+        return {name: kept for name, kept in table.items() if name != key}
     return {**table, key: value}

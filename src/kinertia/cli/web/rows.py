@@ -96,9 +96,9 @@ class Rows:
 def rows(content: Content, typed: Mapping[str, str] | None = None) -> list[Rows]:
     """Return rows of every kind; typed values take precedence over written ones."""
     return [
-        Rows(kind, tuple(_fields(kind, number, row) for number, row in enumerate([*each, {}])))
+        Rows(kind, tuple(_fields(kind, number, row) for number, row in enumerate([*table, {}])))
         for kind in _TABLES
-        for each in (_typed(kind, typed) if typed else _written(kind, content),)
+        for table in (_typed(kind, typed) if typed else _written(kind, content),)
     ]
 
 
@@ -145,10 +145,14 @@ def _written(kind: str, content: Content) -> list[dict[str, str]]:
     """Return rows of the subject file as the form shows them, without those of another shape."""
     value = content.get(kind)
     if kind == _SEGMENT and isinstance(value, Mapping):
-        value = [{_SEGMENT: name, **one} for name, one in value.items() if isinstance(one, Mapping)]
+        value = [{_SEGMENT: name, **entry} for name, entry in value.items() if isinstance(entry, Mapping)]
     if not isinstance(value, list):
         return []
-    return [{key: _shown(one[key]) for key in _keys(kind) if key in one} for one in value if isinstance(one, Mapping)]
+    return [
+        {key: _shown(entry[key]) for key in _keys(kind) if key in entry}
+        for entry in value
+        if isinstance(entry, Mapping)
+    ]
 
 
 def _typed(kind: str, form: Mapping[str, str]) -> list[dict[str, str]]:
@@ -178,7 +182,7 @@ def _with_heads(kind: str, typed: Sequence[Mapping[str, str]], written: int) -> 
                 key, text = next(iter(row.items()))
                 raise SettingsError(f"{title}: a row with {_LABELS[key]} '{text}' has no {head}; fill it in")
             continue
-        if kind == _SEGMENT and any(one[head] == row[head] for one in kept):
+        if kind == _SEGMENT and any(kept_row[head] == row[head] for kept_row in kept):
             raise SettingsError(f"{title}: {row[head]} has two rows; give all its values in one")
         kept.append(dict(row))
     return kept
@@ -221,7 +225,7 @@ class TrialFields:
 
 def trial_fields(content: Content, files: Iterable[str], typed: Mapping[str, str]) -> dict[str, TrialFields]:
     """Return the fields of each file; typed values precede written ones."""
-    written = {file: _written_trial(one) for file, one in _recordings(content)}
+    written = {file: _written_trial(trial) for file, trial in _recordings(content)}
     shown = {}
     for file in files:
         known = written.get(file, TrialFields())
@@ -235,7 +239,7 @@ def trial_fields(content: Content, files: Iterable[str], typed: Mapping[str, str
 
 def conditions(content: Content) -> list[str]:
     """Return the stated conditions, each once."""
-    return list(dict.fromkeys(str(one["condition"]) for _, one in _recordings(content) if one.get("condition")))
+    return list(dict.fromkeys(str(trial["condition"]) for _, trial in _recordings(content) if trial.get("condition")))
 
 
 def with_trial_fields(content: Content, form: Mapping[str, str]) -> Content:
@@ -248,7 +252,8 @@ def with_trial_fields(content: Content, form: Mapping[str, str]) -> Content:
     trials, model = content.get("trial"), content.get("model")
     if isinstance(trials, list):
         changed["trial"] = [
-            _changed(one, str(one.get("markers")), form) if isinstance(one, Mapping) else one for one in trials
+            _changed(trial, str(trial.get("markers")), form) if isinstance(trial, Mapping) else trial
+            for trial in trials
         ]
     if isinstance(model, Mapping) and "static" in model:
         changed["model"] = _changed(model, str(model["static"]), form)
@@ -257,22 +262,22 @@ def with_trial_fields(content: Content, form: Mapping[str, str]) -> Content:
 
 def _recordings(content: Content) -> list[tuple[str, Mapping[str, Any]]]:
     trials, model = content.get("trial"), content.get("model")
-    known = [one for one in trials if isinstance(one, Mapping)] if isinstance(trials, list) else []
+    known = [trial for trial in trials if isinstance(trial, Mapping)] if isinstance(trials, list) else []
     static = [(str(model["static"]), model)] if isinstance(model, Mapping) and "static" in model else []
-    return [*static, *((str(one.get("markers", "")), one) for one in known)]
+    return [*static, *((str(trial.get("markers", "")), trial) for trial in known)]
 
 
-def _written_trial(one: Mapping[str, Any]) -> TrialFields:
-    return TrialFields(str(one.get("condition", "")), *_ends(one.get(_WINDOW)))
+def _written_trial(trial: Mapping[str, Any]) -> TrialFields:
+    return TrialFields(str(trial.get("condition", "")), *_ends(trial.get(_WINDOW)))
 
 
-def _changed(one: Mapping[str, Any], file: str, form: Mapping[str, str]) -> dict[str, Any]:
+def _changed(trial: Mapping[str, Any], file: str, form: Mapping[str, str]) -> dict[str, Any]:
     given: dict[str, Any] = {}
     if CONDITION + file in form:
         given["condition"] = form[CONDITION + file].strip()
     if START + file in form:
-        given[_WINDOW] = _window(file, form[START + file].strip(), form.get(END + file, "").strip(), one.get(_WINDOW))
-    rest = {key: value for key, value in one.items() if key not in given}
+        given[_WINDOW] = _window(file, form[START + file].strip(), form.get(END + file, "").strip(), trial.get(_WINDOW))
+    rest = {key: value for key, value in trial.items() if key not in given}
     return {**rest, **{key: value for key, value in given.items() if value}}
 
 

@@ -34,7 +34,7 @@ def check(person: PersonFolder, progress: Progress) -> None:
 
     wanted = read_subject(person.subject)
     checked = check_person(read_person(wanted, progress))
-    windows = windows_of(wanted, {one.context.name: one.windows for one in checked.recordings})
+    windows = windows_of(wanted, {recording.context.name: recording.windows for recording in checked.recordings})
     with complete_folder(person.check, "app") as work:
         save_check_page([checked.overview], checked.recordings, (), work)
         _write(work, {"inputs": person.inputs, **digest(checked.overview, windows)})
@@ -52,7 +52,7 @@ def fit(person: PersonFolder, progress: Progress) -> None:
     wanted = read_subject(person.subject)
     result = fit_subject(wanted, progress)
     progress("writing the results", 0.0)
-    windows = windows_of(wanted, {one.name: longest_first(one.kinematics.windows_s) for one in result.trials})
+    windows = windows_of(wanted, {trial.name: longest_first(trial.kinematics.windows_s) for trial in result.trials})
     command = command_line(["kinertia", "fit", str(person.subject), "-o", str(person.results)])
     with complete_folder(person.results, "app") as work:
         save_fit(result, work, provenance_of(wanted, command), force=True)
@@ -64,7 +64,7 @@ def fit(person: PersonFolder, progress: Progress) -> None:
                 "inputs": person.inputs,
                 "summary": sha256(work / SUMMARY),
                 **digest(result.overview, windows),
-                "purposes": [one._asdict() for one in words(result).purposes],
+                "purposes": [purpose._asdict() for purpose in words(result).purposes],
                 "ended": ended,
                 "seconds": round(ended - begun, 1),
             },

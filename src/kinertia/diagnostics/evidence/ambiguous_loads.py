@@ -138,7 +138,7 @@ def _by_pressure(contact: PlateContact, corners: FloatArray) -> list[Overhang]:
     def near(distance_m: float) -> BoolArray:
         """Return (k,) whether some place within this distance is outside all plates, not just in a gap between them."""
         around = contact.place[:, None] + (distance_m + _GAP_M) * ring
-        outside = np.min([beyond_edges(one, around) for one in corners], axis=0)
+        outside = np.min([beyond_edges(corner, around) for corner in corners], axis=0)
         result: BoolArray = (outside > _GAP_M).any(axis=1)
         return result
 
@@ -169,12 +169,12 @@ def _overhang(contact: PlateContact, corners: FloatArray, time: FloatArray, foot
     seen, loaded = np.isfinite(foot.place).all(axis=2), within(time, contact.time[0], contact.time[-1])
     height = np.where(seen, foot.place[..., 1], np.inf)
     low = height < height[loaded].min(axis=0, initial=np.inf) + _LOW_M
-    each = np.stack([beyond_edges(one, foot.place[..., [0, 2]]) for one in corners])
-    beyond = np.where(seen, each.min(axis=0), -np.inf)
+    beyond_plates = np.stack([beyond_edges(plate_corners, foot.place[..., [0, 2]]) for plate_corners in corners])
+    beyond = np.where(seen, beyond_plates.min(axis=0), -np.inf)
     bearing = low & loaded[:, None]
     usual = np.array([np.median(beyond[on, k]) if on.any() else -np.inf for k, on in enumerate(bearing.T)])
     far = usual > foot.limit_m
-    if not far.any() or not ((each[contact.plate] < 0.0) & bearing).any():
+    if not far.any() or not ((beyond_plates[contact.plate] < 0.0) & bearing).any():
         return []
     more = far & (~foot.toe | (usual > _TOE_M))
     out = (low & (beyond > foot.limit_m) & (more if more.any() else far)).any(axis=1)
@@ -260,14 +260,14 @@ def _to_toes(contact: PlateContact, feet: Feet, marker_set: MarkerSet | None) ->
 def _under_both(contact: PlateContact) -> BoolArray:
     """Return (k,) where the load is between the feet, or away from its own foot while the other bears a good part of
     it."""
-    own, other = np.linalg.norm(contact.offset_m, axis=2)[[contact.foot, 1 - contact.foot]]
+    apart_m, other = np.linalg.norm(contact.offset_m, axis=2)[[contact.foot, 1 - contact.foot]]
     opposite = np.prod(contact.offset_m, axis=0).sum(axis=1) < 0
-    away: BoolArray = np.minimum(own, other) > BETWEEN_M
+    away: BoolArray = np.minimum(apart_m, other) > BETWEEN_M
     away &= opposite
     # on a treadmill's single belt the feet come in turn, and each sample is sorted (`plate_assignment`)
     if span_s(contact.time) <= ONE_STEP_S:
-        away |= own > OUTSIDE_M
-    away &= own > OTHERS_SHARE * (own + other)
+        away |= apart_m > OUTSIDE_M
+    away &= apart_m > OTHERS_SHARE * (apart_m + other)
     return away
 
 
@@ -281,7 +281,7 @@ def shows_whole_feet(feet: Feet | None, marker_set: MarkerSet | None, seen: Coll
             labels = {label for name in names for label in marker_set.landmarks.get(f"{name}_{side}", ())}
             if labels and not labels & set(seen):
                 return False
-    return min(one.length_m for one in feet) > _LEAST_LENGTH_M
+    return min(foot.length_m for foot in feet) > _LEAST_LENGTH_M
 
 
 def stray_contacts(
@@ -290,11 +290,13 @@ def stray_contacts(
     """Return the loads far from both feet, while these are seen; none unless most loads are under feet, since plates or
     times may be wrong.
     """
-    away = [one for one in contacts if one.distance_m > FAR_M and not one.between]
+    away = [contact for contact in contacts if contact.distance_m > FAR_M and not contact.between]
     if len(away) >= len(contacts) / 2:
         return ()
     return tuple(
-        one for one in away if one.distance_m > STRAY_M and all(foot.seen(one.time).mean() > _SEEN for foot in feet)
+        contact
+        for contact in away
+        if contact.distance_m > STRAY_M and all(foot.seen(contact.time).mean() > _SEEN for foot in feet)
     )
 
 
@@ -303,13 +305,13 @@ def without_loads(plates: PlateLoads, contacts: Sequence[PlateContact], others: 
     if not contacts:
         return plates
     force, moment = plates.force.copy(), plates.moment.copy()
-    for one in contacts:
-        during = within(plates.time, one.time[0], one.time[-1])
-        for first, last in runs(plates.force[:, one.plate, 1] > 0):
+    for contact in contacts:
+        during = within(plates.time, contact.time[0], contact.time[-1])
+        for first, last in runs(plates.force[:, contact.plate, 1] > 0):
             span = slice(first, last + 1)
             during[span] |= during[span].any()
         for other in others:
-            if other.plate == one.plate:
+            if other.plate == contact.plate:
                 during &= ~within(plates.time, other.time[0], other.time[-1])
-        force[during, one.plate], moment[during, one.plate] = 0.0, 0.0
+        force[during, contact.plate], moment[during, contact.plate] = 0.0, 0.0
     return replace(plates, force=force, moment=moment)

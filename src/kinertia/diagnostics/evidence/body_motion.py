@@ -53,7 +53,7 @@ class ForceVelocity:
     def cut(self, start_s: float, end_s: float) -> "ForceVelocity":
         """Return the part with start_s <= time <= end_s."""
         inside = within(self.time, start_s, end_s)
-        pelvis, centre, by_forces = (each[inside] for each in (self.pelvis, self.centre, self.by_forces))
+        pelvis, centre, by_forces = (velocity[inside] for velocity in (self.pelvis, self.centre, self.by_forces))
         return ForceVelocity(self.time[inside], pelvis, centre, by_forces, self.mass_kg)
 
     def by(self, time: FloatArray, force: FloatArray) -> FloatArray:
@@ -100,7 +100,7 @@ def without_trend(time: FloatArray, values: FloatArray) -> FloatArray:
 
 def joined_without_trend(parts: Sequence[ForceVelocity], values: Sequence[FloatArray]) -> FloatArray:
     """Join values (n,) or (n, k) of all windows, each without its linear trend."""
-    return np.concatenate([without_trend(part.time, each) for part, each in zip(parts, values, strict=True)])
+    return np.concatenate([without_trend(part.time, series) for part, series in zip(parts, values, strict=True)])
 
 
 def force_velocities(trial: Trial, owners: Mapping[str, str]) -> list[ForceVelocity]:
@@ -203,14 +203,14 @@ class VelocityResidual:
         reversed_, zeroed, zero_offset_n, scaled = [], [], [], [_scaled(None, off, by_forces)]
         newtons = []
         for p, own_force in enumerate(np.moveaxis(force, 1, 0)):
-            own, one_newton = (
-                _centred([part.by(time, each) for part in parts])
-                for each in (own_force[:, axis], (own_force[:, 1] > 0.0).astype(float))
+            plate_velocity, one_newton = (
+                _centred([part.by(time, force_series) for part in parts])
+                for force_series in (own_force[:, axis], (own_force[:, 1] > 0.0).astype(float))
             )
             newtons.append(one_newton)
             zero_offset_n.append(float(one_newton @ off) / max(float(one_newton @ one_newton), 1e-12))
-            scaled.append(_scaled(p, off, own))
-            reversed_.append(np.std(off - 2.0 * own))
+            scaled.append(_scaled(p, off, plate_velocity))
+            reversed_.append(np.std(off - 2.0 * plate_velocity))
             zeroed.append(np.std(off - zero_offset_n[-1] * one_newton))
         trends = joined_without_trend(parts, [part.by_forces[:, axis] - part.centre[:, axis] for part in parts])
         return cls(
@@ -238,10 +238,12 @@ def steady_scaled(
     by_forces = [part.by_forces[:, axis] for part in parts]
     moved = [(part.pelvis[:, axis] + part.centre[:, axis]) / 2 for part in parts]
     off = joined_without_trend(parts, by_forces) - joined_without_trend(parts, moved)
-    by_plate = [[part.by(time, own) for part in parts] for own in force[..., axis].T]
+    by_plate = [[part.by(time, plate_force) for part in parts] for plate_force in force[..., axis].T]
     plates = [None, *range(len(by_plate))]
-    each = zip(plates, [by_forces, *by_plate], strict=True)
-    return float(np.std(off)), tuple(_scaled(plate, off, joined_without_trend(parts, own)) for plate, own in each)
+    readings = zip(plates, [by_forces, *by_plate], strict=True)
+    return float(np.std(off)), tuple(
+        _scaled(plate, off, joined_without_trend(parts, velocity)) for plate, velocity in readings
+    )
 
 
 def rotated_residual(parts: Sequence[ForceVelocity], angle: float) -> float:
@@ -265,14 +267,21 @@ def misread_plate_residuals(time: FloatArray, force: FloatArray, parts: Sequence
         per plate the residual if its axes are exchanged with either sign, or rotated by 90 degrees either way.
     """
     body, by_forces = (
-        _centred([each[:, 2] + 1j * each[:, 0] for each in of_parts])
+        _centred([velocity[:, 2] + 1j * velocity[:, 0] for velocity in of_parts])
         for of_parts in ([(part.pelvis + part.centre) / 2 for part in parts], [part.by_forces for part in parts])
     )
     residuals = []
     for own_force in np.moveaxis(force, 1, 0):
-        own = _centred([part.by(time, own_force[:, 2]) + 1j * part.by(time, own_force[:, 0]) for part in parts])
-        true = (1j * own.conj(), -1j * own.conj(), 1j * own, -1j * own)
-        residuals.append([np.sqrt(np.mean(np.square(np.abs(by_forces - body - own + each)))) for each in true])
+        plate_velocity = _centred(
+            [part.by(time, own_force[:, 2]) + 1j * part.by(time, own_force[:, 0]) for part in parts]
+        )
+        true = (1j * plate_velocity.conj(), -1j * plate_velocity.conj(), 1j * plate_velocity, -1j * plate_velocity)
+        residuals.append(
+            [
+                np.sqrt(np.mean(np.square(np.abs(by_forces - body - plate_velocity + true_velocity))))
+                for true_velocity in true
+            ]
+        )
     return np.array(residuals)
 
 
@@ -284,14 +293,14 @@ def _all_zeroed(off: FloatArray, newtons: FloatArray) -> float:
     return float(np.std(off - newtons @ zeros_n if possible else off))
 
 
-def _scaled(plate: int | None, off: FloatArray, own: FloatArray) -> Scaled:
-    share = float(own @ off) / max(float(own @ own), 1e-12)
-    return Scaled(plate, 1.0 / (1.0 - share) if share < 1.0 else np.inf, float(np.std(off - share * own)))
+def _scaled(plate: int | None, off: FloatArray, velocity: FloatArray) -> Scaled:
+    share = float(velocity @ off) / max(float(velocity @ velocity), 1e-12)
+    return Scaled(plate, 1.0 / (1.0 - share) if share < 1.0 else np.inf, float(np.std(off - share * velocity)))
 
 
 def _centred(windows: Sequence[np.ndarray]) -> np.ndarray:
     """Concatenate the windows, each less its mean."""
-    return np.concatenate([each - each.mean() for each in windows])
+    return np.concatenate([values - values.mean() for values in windows])
 
 
 @dataclass(frozen=True)
@@ -311,14 +320,14 @@ class VerticalVelocityFit:
 
 
 def vertical_match(
-    part: ForceVelocity, shown: FloatArray, own: FloatArray | None = None, growing: bool = False
+    part: ForceVelocity, shown: FloatArray, plate_velocity: FloatArray | None = None, growing: bool = False
 ) -> VerticalVelocityFit | None:
     """Fit the vertical velocity by Gauss-Newton; None where the velocities do not follow the forces.
 
     Args:
         part: the force-derived velocity, over (n,) s.
         shown: (n, 3) m/s, of the pelvis or of the marker-based centre.
-        own: (n,) m/s due to one plate, if its gain may be wrong.
+        plate_velocity: (n,) m/s due to one plate, if its gain may be wrong.
         growing: whether the delay may change over time.
     """
     after = part.time - part.time.mean()
@@ -333,21 +342,21 @@ def vertical_match(
         moved, since = np.interp(at[inside], part.time, by_forces), after[inside]
         columns = [moved, pushed, np.ones_like(since), since]
         columns += [since * pushed] if growing else []
-        columns += [] if own is None else [np.interp(at[inside], part.time, own)]
+        columns += [] if plate_velocity is None else [np.interp(at[inside], part.time, plate_velocity)]
         terms, wanted = np.stack(columns, axis=1), shown[inside, 1]
         solution = np.linalg.lstsq(terms, wanted, rcond=None)[0]
         if solution[0] <= 0.0:
             return None
         delay += float(solution[1] / solution[0])
         rate_error += float(solution[4] / solution[0]) if growing else 0.0
-    gain = 0.0 if own is None else float(solution[-1] / solution[0])
+    gain = 0.0 if plate_velocity is None else float(solution[-1] / solution[0])
     left = float(np.std(wanted - terms @ solution) / max(float(np.std(wanted)), 1e-12))
     return VerticalVelocityFit(delay, rate_error, gain, left)
 
 
 def vertical_match_of(
-    part: ForceVelocity, own: FloatArray | None = None, growing: bool = False
+    part: ForceVelocity, plate_velocity: FloatArray | None = None, growing: bool = False
 ) -> Sequence[VerticalVelocityFit]:
     """Fit pelvis and marker-based centre of mass; empty where either does not follow the forces."""
-    found = [vertical_match(part, shown, own, growing) for shown in (part.pelvis, part.centre)]
-    return [one for one in found if one is not None] if all(found) else []
+    found = [vertical_match(part, shown, plate_velocity, growing) for shown in (part.pelvis, part.centre)]
+    return [match for match in found if match is not None] if all(found) else []

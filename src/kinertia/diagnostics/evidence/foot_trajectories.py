@@ -204,10 +204,10 @@ def _foot_places(markers: Markers, feet: Mapping[str, Sequence[str]]) -> list[Fl
 
 def _belts(places: Sequence[FloatArray], velocities: Sequence[FloatArray]) -> list[FloatArray]:
     """Compute the velocity (3,) m/s of each foot's surface: one for both feet unless their belts differ in speed."""
-    own = [_belt([place], [velocity]) for place, velocity in zip(places, velocities, strict=True)]
-    moving = min(float(np.linalg.norm(belt)) for belt in own) >= LEAST_BELT_M_S
-    apart = float(np.linalg.norm(own[0] - own[1])) >= LEAST_BELT_M_S
-    return own if moving and apart else [_belt(places, velocities)] * len(own)
+    of_each_foot = [_belt([place], [velocity]) for place, velocity in zip(places, velocities, strict=True)]
+    moving = min(float(np.linalg.norm(belt)) for belt in of_each_foot) >= LEAST_BELT_M_S
+    apart = float(np.linalg.norm(of_each_foot[0] - of_each_foot[1])) >= LEAST_BELT_M_S
+    return of_each_foot if moving and apart else [_belt(places, velocities)] * len(of_each_foot)
 
 
 def _belt(places: Sequence[FloatArray], velocities: Sequence[FloatArray]) -> FloatArray:
@@ -267,13 +267,13 @@ def _ends(time: FloatArray, place: FloatArray) -> tuple[FloatArray, FloatArray, 
     shown = np.flatnonzero(seen.any(axis=0))
     apart = np.linalg.norm(flat[:, :, None] - flat[:, None], axis=-1)
     usual = np.full(often.shape, -1.0)
-    for one in shown:
+    for landmark in shown:
         for other in shown:
-            if often[one, other] >= _MOSTLY * often.max():
-                usual[one, other] = float(np.nanmedian(apart[:, one, other]))
-    one, other = np.unravel_index(int(np.argmax(usual)), usual.shape)
-    both = seen[:, one] & seen[:, other]
-    return bridged_trajectory(time, place[:, one]), bridged_trajectory(time, place[:, other]), both
+            if often[landmark, other] >= _MOSTLY * often.max():
+                usual[landmark, other] = float(np.nanmedian(apart[:, landmark, other]))
+    landmark, other = np.unravel_index(int(np.argmax(usual)), usual.shape)
+    both = seen[:, landmark] & seen[:, other]
+    return bridged_trajectory(time, place[:, landmark]), bridged_trajectory(time, place[:, other]), both
 
 
 def periods(loads: FootLoads) -> tuple[list[float], list[float]]:
@@ -288,7 +288,7 @@ def periods(loads: FootLoads) -> tuple[list[float], list[float]]:
         if not _alternating(*events):
             continue
         both = sorted((time, foot) for foot, times in enumerate(events) for time in times)
-        between = [b - a for (a, one), (b, other) in pairwise(both) if one != other]
+        between = [b - a for (a, foot), (b, other) in pairwise(both) if foot != other]
         if 2 * sum(round(step, 6) < _SHORTEST_STEP_S for step in between) > len(between):
             continue
         strides += [b - a for times in events for a, b in combinations(times, 2)]
@@ -348,8 +348,8 @@ def _alternating(right: Sequence[float], left: Sequence[float]) -> bool:
     """Return whether the known events of one foot lie well between those of the other."""
     phases = [
         (between - start) / (end - start)
-        for own, other in ((right, left), (left, right))
-        for start, end in pairwise(own)
+        for stances, other in ((right, left), (left, right))
+        for start, end in pairwise(stances)
         for between in other
         if start - _TOGETHER * (end - start) <= between < end + _TOGETHER * (end - start)
     ]

@@ -148,12 +148,14 @@ def force_mass(segment_of_label: Mapping[str, str], trial: Trial, standing: bool
         return None
     # weight that is on no plate at the ends of the window affects only the mean over the whole window
     whole_kg, whole_sd_kg, _ = found[0]
-    fitting = [one for one in found if abs(one[0] - whole_kg) <= 2.0 * float(np.hypot(one[1], whole_sd_kg))]
+    fitting = [
+        estimate for estimate in found if abs(estimate[0] - whole_kg) <= 2.0 * float(np.hypot(estimate[1], whole_sd_kg))
+    ]
     slow = smooth(loads.time[inside], force[inside], _SLOW_HZ)(time)
     needed = GRAVITY_M_S2 + smooth(around.time, height, _SLOW_HZ)(time, 2)
     least = 0.3 * GRAVITY_M_S2
     supported = np.where(needed > least, slow / np.maximum(needed, least), np.nan)
-    return ForceMass(*min(fitting, key=lambda one: one[1]), time, supported)
+    return ForceMass(*min(fitting, key=lambda estimate: estimate[1]), time, supported)
 
 
 def _spans(loads: FootLoads, start_s: float, end_s: float, standing: bool) -> list[tuple[str, float, float]]:
@@ -164,7 +166,7 @@ def _spans(loads: FootLoads, start_s: float, end_s: float, standing: bool) -> li
     strides, steps = periods(loads)
     step = float(np.median(steps)) if steps else np.inf
     for over, times in (("whole strides", strides), ("steps", (step, 2.0 * step))):
-        if fitting := [one for one in times if one <= lasts_s]:
+        if fitting := [length_s for length_s in times if length_s <= lasts_s]:
             off = (lasts_s - max(fitting)) / 2.0
             spans.append((over, start_s + off, end_s - off))
     return spans
@@ -247,8 +249,8 @@ def _beyond_plates(plates: PlateLoads, feet: FloatArray) -> bool:
     """Return whether a marker on the feet (m, 2) is beyond the edges of all plates, whose corners are known."""
     if plates.corners is None:
         return False
-    each = np.stack([beyond_edges(corners, feet) for corners in plates.corners])
-    return bool((each.min(axis=0) > OVERHANG_M).any())
+    beyond_plates = np.stack([beyond_edges(corners, feet) for corners in plates.corners])
+    return bool((beyond_plates.min(axis=0) > OVERHANG_M).any())
 
 
 def plate_masses(

@@ -67,7 +67,7 @@ def most_forwards(markers: Markers, known: Mapping[str, FloatArray]) -> float:
     if not known or len(middle) < 2 or np.linalg.norm(horizontal(middle[-1] - middle[0])) < _GOES_M:
         return 0.0
     way = np.broadcast_to(middle[-1] - middle[0], markers.positions[:, 0].shape)
-    return max(cosine(each, way) for each in known.values())
+    return max(cosine(direction, way) for direction in known.values())
 
 
 def horizontal(vectors: FloatArray) -> FloatArray:
@@ -138,7 +138,7 @@ def body_centre(owners: Mapping[str, str], markers: Markers) -> FloatArray | Non
     if not places.keys() & {"pelvis", "torso"}:
         return None
     shares = {name: _share(name) for name in places}
-    middles = (shares[name] * np.mean(own, axis=0) for name, own in places.items())
+    middles = (shares[name] * np.mean(landmarks, axis=0) for name, landmarks in places.items())
     total: FloatArray = sum(middles, np.zeros((len(seen), 3)))
     return total / sum(shares.values())
 

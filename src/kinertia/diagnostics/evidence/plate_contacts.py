@@ -119,8 +119,8 @@ def contacts_of(
             rows = rows[(vertical[rows] > COP_MIN_FORCE_N) & (time >= first_s) & (time <= last_s)]
             if len(rows) < 3:
                 continue
-            off = np.stack([one.offset_m(plates.time[rows], point[rows, p]) for one in feet])
-            near = [float(vertical[rows] @ _length(one)) for one in off]
+            off = np.stack([trajectory.offset_m(plates.time[rows], point[rows, p]) for trajectory in feet])
+            near = [float(vertical[rows] @ _length(offset_m)) for offset_m in off]
             foot = int(np.argmin(near))
             seen = feet[foot].seen(plates.time[rows])
             if vertical[rows][seen].sum() < vertical[rows].sum() / 2:
@@ -197,7 +197,7 @@ class ContactFit:
         delays = [delay for contact in contacts for delay in _delays(contact, feet[contact.foot])]
         enough = len(delays) >= _FEWEST_EDGES
         rms_s = float(np.sqrt(np.mean(np.square(delays)))) if enough else np.inf
-        return cls(rms_s, max((one.distance_m for one in contacts), default=np.inf))
+        return cls(rms_s, max((contact.distance_m for contact in contacts), default=np.inf))
 
     @property
     def fits(self) -> bool:
@@ -227,10 +227,10 @@ class Hypothesis(NamedTuple):
             return np.inf, np.inf
         contacts = contacts_of(self.corrected, feet)
         off_m = [
-            np.sqrt(np.average(np.square(one.place - expected).sum(axis=1), weights=one.weight))
-            for one in contacts
-            if one.is_step
-            for expected in (feet[one.foot].expected_cop(one.time, one.weight),)
+            np.sqrt(np.average(np.square(contact.place - expected).sum(axis=1), weights=contact.weight))
+            for contact in contacts
+            if contact.is_step
+            for expected in (feet[contact.foot].expected_cop(contact.time, contact.weight),)
         ]
         return ContactFit.of(contacts, feet).misfit, round(float(max(off_m, default=np.inf)), 2)
 

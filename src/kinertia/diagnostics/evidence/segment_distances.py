@@ -53,11 +53,17 @@ class SegmentDistances:
         """Compute the distances between the markers that the set has on pelvis, legs and feet."""
         both = set(static.labels) & set(trial.labels)
         segments = [[label for label in marker_set.segments.get(name, ()) if label in both] for name in LOWER_BODY]
-        labels = tuple(dict.fromkeys(label for own in segments for label in own))
+        labels = tuple(dict.fromkeys(label for labels_of_segment in segments for label in labels_of_segment))
         place = {label: k for k, label in enumerate(labels)}
         before, after = (_medians(markers, labels) for markers in (static, trial))
-        pairs = [(place[a], place[b], k) for k, own in enumerate(segments) for a, b in combinations(own, 2)]
-        known = np.array([one for one in pairs if before[one[:2]] > 0 and after[one[:2]] > 0], dtype=int).reshape(-1, 3)
+        pairs = [
+            (place[a], place[b], k)
+            for k, labels_of_segment in enumerate(segments)
+            for a, b in combinations(labels_of_segment, 2)
+        ]
+        known = np.array([pair for pair in pairs if before[pair[:2]] > 0 and after[pair[:2]] > 0], dtype=int).reshape(
+            -1, 3
+        )
         return cls(labels, before, after, known[:, :2], known[:, 2])
 
     def ratio(self) -> float:
@@ -126,14 +132,14 @@ def _best(distances: SegmentDistances, candidates: Iterator[tuple[tuple[int, int
     """Return the exchange that resolves the differences of its markers; of several, the one that gains most."""
     off, found = np.abs(distances.differences()), []
     for pairs in candidates:
-        own = np.isin(distances.pairs, pairs).any(axis=1)
-        if not own.any() or off[own].max() <= _SWAPPED_M:
+        involved = np.isin(distances.pairs, pairs).any(axis=1)
+        if not involved.any() or off[involved].max() <= _SWAPPED_M:
             continue
-        after = np.nan_to_num(np.abs(distances.differences(_exchanged(distances, pairs))[own]), nan=np.inf)
-        if after.max() < _RESOLVED_SHARE * off[own].max():
-            gain = float(off[own].sum() - after.sum())
-            found.append(_Exchange(pairs, float(off[own].max()), float(after.max()), gain))
-    return max(found, key=lambda one: one.gain_m, default=None)
+        after = np.nan_to_num(np.abs(distances.differences(_exchanged(distances, pairs))[involved]), nan=np.inf)
+        if after.max() < _RESOLVED_SHARE * off[involved].max():
+            gain = float(off[involved].sum() - after.sum())
+            found.append(_Exchange(pairs, float(off[involved].max()), float(after.max()), gain))
+    return max(found, key=lambda swap: swap.gain_m, default=None)
 
 
 def _exchanged(distances: SegmentDistances, pairs: Sequence[tuple[int, int]]) -> NDArray[np.int_]:

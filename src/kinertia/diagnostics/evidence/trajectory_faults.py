@@ -120,7 +120,7 @@ class TrajectoryFaults:
     def labels(self) -> frozenset[str]:
         """Labels of all markers with faults."""
         found: tuple[Fault, ...] = (*self.spikes, *self.jumps, *self.filled)
-        return frozenset(one.label for one in found)
+        return frozenset(fault.label for fault in found)
 
 
 MOST_SPIKES = Limit(2)
@@ -210,12 +210,12 @@ def _frames_off(place: FloatArray, frame: int, rate_hz: float) -> tuple[int, int
 def _by_marker(spikes: Sequence[Spikes]) -> tuple[Spikes, ...]:
     """Merge spikes into one entry per marker."""
     found: dict[str, Spikes] = {}
-    for one in spikes:
-        own = found.get(one.label, one)
-        span = (min(own.span_s[0], one.span_s[0]), max(own.span_s[1], one.span_s[1]))
-        frames, far = (0, 0) if own is one else (own.frames, own.far_frames)
-        distance_m = max(own.distance_m, one.distance_m)
-        found[one.label] = Spikes(one.label, span, distance_m, frames + one.frames, far + one.far_frames)
+    for spike in spikes:
+        merged = found.get(spike.label, spike)
+        span = (min(merged.span_s[0], spike.span_s[0]), max(merged.span_s[1], spike.span_s[1]))
+        frames, far = (0, 0) if merged is spike else (merged.frames, merged.far_frames)
+        distance_m = max(merged.distance_m, spike.distance_m)
+        found[spike.label] = Spikes(spike.label, span, distance_m, frames + spike.frames, far + spike.far_frames)
     return tuple(found.values())
 
 
@@ -226,8 +226,8 @@ def _filled(markers: Markers, segments: Mapping[str, Sequence[str]]) -> tuple[Fi
     found = []
     straight = _straight(markers.positions, count)
     for k, label in enumerate(markers.labels):
-        own = next((labels for labels in segments.values() if label in labels), ())
-        mates = [markers.labels.index(one) for one in own if one != label and one in markers.labels]
+        of_segment = next((labels for labels in segments.values() if label in labels), ())
+        mates = [markers.labels.index(mate) for mate in of_segment if mate != label and mate in markers.labels]
         for first, last in runs(straight[:, k]):
             inside = slice(first, last + count)
             way = markers.positions[inside, k]

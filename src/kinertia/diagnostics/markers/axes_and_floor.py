@@ -77,9 +77,9 @@ def floor_slope(context: RecordingContext) -> Iterator[Finding]:
     markers = context.all_markers
     if len(markers.time) < 2:
         return
-    labels = [label for own in context.feet.values() for label in own]
+    labels = [label for labels_of_foot in context.feet.values() for label in labels_of_foot]
     stances = [_stances(markers.time, markers.positions[:, markers.labels.index(label)]) for label in labels]
-    of_marker = np.repeat(np.arange(len(labels)), [len(one) for one in stances])
+    of_marker = np.repeat(np.arange(len(labels)), [len(stance) for stance in stances])
     if len(of_marker) < _FEWEST_PLACES + len(labels):
         return
     place = np.concatenate(stances)
@@ -133,7 +133,7 @@ def floor(context: PersonContext) -> Iterator[Finding]:
     low, high = _LOWEST_M, _HIGHEST_M
     if low <= height_m <= high:
         return
-    in_trials = [own for trial in context.trials for own in _heights_in_motion(trial)]
+    in_trials = [lowest_m for trial in context.trials for lowest_m in _heights_in_motion(trial)]
     shared = all(own_m < low if height_m < low else own_m > high for own_m in in_trials)
     height = Quantity(height_m, "m", limit=low if height_m < low else high, usual=_LOWEST_M.usual)
     found = finding("M143", static.at(markers=(label,)), height_m=height)
@@ -144,7 +144,7 @@ def _heights_in_motion(trial: RecordingContext) -> list[float]:
     """Return how high (m) the lowest foot marker is above each plate, and above the floor; empty if unknown."""
     on_plates = [lowest - surface for lowest, surface in heights_on_plates(trial).values()]
     lowest = _lowest(trial, _IN_MOTION)
-    return [own for own in (*on_plates, *([] if lowest is None else [lowest[1]])) if np.isfinite(own)]
+    return [height_m for height_m in (*on_plates, *([] if lowest is None else [lowest[1]])) if np.isfinite(height_m)]
 
 
 def _lowest(context: RecordingContext, percentile: float) -> tuple[str, float] | None:
@@ -154,11 +154,13 @@ def _lowest(context: RecordingContext, percentile: float) -> tuple[str, float] |
     names = [f"{name}_{side}" for name in ("heel", "metatarsal", "toe") for side in "rl"]
     of_landmark = [context.marker_set.landmarks.get(name, ()) for name in names]
     present = context.all_markers.labels
-    labels = list(dict.fromkeys(label for own in of_landmark for label in own if label in present))
+    labels = list(
+        dict.fromkeys(label for labels_of_landmark in of_landmark for label in labels_of_landmark if label in present)
+    )
     heights = context.all_markers.select(labels).positions[..., 1]
     shown = np.isfinite(heights).any(axis=0)
     if not all(of_landmark[:4]) or not shown.any():
         return None
-    each = np.where(shown, np.nanpercentile(np.where(shown, heights, 0.0), percentile, axis=0), np.inf)
-    lowest = int(np.argmin(each))
-    return labels[lowest], float(each[lowest])
+    low = np.where(shown, np.nanpercentile(np.where(shown, heights, 0.0), percentile, axis=0), np.inf)
+    lowest = int(np.argmin(low))
+    return labels[lowest], float(low[lowest])

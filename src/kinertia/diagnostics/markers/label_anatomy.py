@@ -73,7 +73,7 @@ def anatomy(context: RecordingContext) -> Iterator[Finding]:
     right = np.cross(_mean_heading(known), _UP)
     sides = list(_swapped_sides(body, right))
     yield from sides
-    if any(one.code == "L201" for one in sides):
+    if any(side.code == "L201" for side in sides):
         return
     yield from _order(body)
     yield from _ankles(body)
@@ -107,7 +107,9 @@ def _reversed_parts(body: _Body, known: Mapping[str, FloatArray]) -> Iterator[Fi
         sides = {side: horizontal(places[f"asis_{side}"] - places[f"psis_{side}"]) for side in "rl"}
         opposed = cosine(sides["r"], sides["l"])
         if opposed < -_OPPOSED:
-            backwards = [side for side, along in sides.items() if feet and max(cosine(along, one) for one in feet) < 0]
+            backwards = [
+                side for side, along in sides.items() if feet and max(cosine(along, forwards) for forwards in feet) < 0
+            ]
             names = [f"{name}_{side}" for side in backwards or "rl" for name in ("asis", "psis")]
             which = Quantity(in_words(f"side_{backwards[0]}") if len(backwards) == 1 else "one side")
             yield body.found("L203", *names, cosine=Quantity(opposed, "1", limit=-_OPPOSED), side=which)
@@ -123,8 +125,8 @@ def _reversed_parts(body: _Body, known: Mapping[str, FloatArray]) -> Iterator[Fi
 
 
 def _blamed_part(body: _Body, part: str) -> bool:
-    own = ("asis_r", "asis_l") if part == "pelvis" else (f"heel_{part[-1]}",)
-    return bool(body.blamed & set(own))
+    landmarks = ("asis_r", "asis_l") if part == "pelvis" else (f"heel_{part[-1]}",)
+    return bool(body.blamed & set(landmarks))
 
 
 def _odd_one_out(known: Mapping[str, FloatArray]) -> tuple[str, float]:
@@ -136,8 +138,8 @@ def _odd_one_out(known: Mapping[str, FloatArray]) -> tuple[str, float]:
     left, right = (_rotation_from(known["pelvis"], known[foot]) for foot in ("foot_l", "foot_r"))
     agreed["foot_l", "foot_r"] = float((left * right.conjugate()).real)
     for part in known:
-        with_it = [each for pair, each in agreed.items() if part in pair]
-        without = [each for pair, each in agreed.items() if part not in pair]
+        with_it = [cosine_of_pair for pair, cosine_of_pair in agreed.items() if part in pair]
+        without = [cosine_of_pair for pair, cosine_of_pair in agreed.items() if part not in pair]
         if max(with_it) < -CLEAR and min(without) > CLEAR:
             return part, max(with_it)
     return "", 1.0
@@ -145,8 +147,8 @@ def _odd_one_out(known: Mapping[str, FloatArray]) -> tuple[str, float]:
 
 def _rotation_from(vectors: FloatArray, others: FloatArray) -> complex:
     """Return the mean rotation about the vertical from one direction to another, over frames with both, unit number."""
-    one, other = (each[:, 0] + 1j * each[:, 2] for each in (vectors, others))
-    rotation = other * one.conjugate()
+    of_pair, other = (vector[:, 0] + 1j * vector[:, 2] for vector in (vectors, others))
+    rotation = other * of_pair.conjugate()
     with np.errstate(invalid="ignore", divide="ignore"):
         rotation /= np.abs(rotation)
     mean = complex(rotation[np.isfinite(rotation)].sum())
@@ -157,18 +159,18 @@ def _swapped_sides(body: _Body, right: FloatArray) -> Iterator[Finding]:
     """Report L201, or L202 of each pair whose sides are swapped."""
     stands, labels = body.context.travel.kind == "stands still", body.marker_set.landmarks
     of_one_marker = labels.get("toe_r") == labels.get("metatarsal_r")
-    more = [one for one in _STANDING_PAIRS if stands and not (one == "toe" and of_one_marker)]
+    more = [name for name in _STANDING_PAIRS if stands and not (name == "toe" and of_one_marker)]
     pairs = [pair for pair in (*_PAIRS, *more) if body.shows(f"{pair}_r", f"{pair}_l")]
     across = {pair: cosine(body.places[f"{pair}_r"] - body.places[f"{pair}_l"], right) for pair in pairs}
-    wrong = {pair: each for pair, each in across.items() if each < -CLEAR}
-    clear = sum(abs(each) > CLEAR for each in across.values())
+    wrong = {pair: cosine_of_pair for pair, cosine_of_pair in across.items() if cosine_of_pair < -CLEAR}
+    clear = sum(abs(cosine_of_pair) > CLEAR for cosine_of_pair in across.values())
     if len(wrong) > 1 and len(wrong) == clear:
         count = Quantity(float(len(wrong)), "1")
         mean = Quantity(float(np.mean(list(wrong.values()))), "1", limit=-CLEAR)
         yield finding("L201", body.context.at(), pairs=count, cosine=mean)
         return
-    for pair, each in wrong.items():
-        yield body.found("L202", f"{pair}_r", f"{pair}_l", cosine=Quantity(each, "1", limit=-CLEAR))
+    for pair, cosine_of_pair in wrong.items():
+        yield body.found("L202", f"{pair}_r", f"{pair}_l", cosine=Quantity(cosine_of_pair, "1", limit=-CLEAR))
     yield from _swapped_labels(body, right)
 
 
@@ -179,17 +181,17 @@ def _swapped_labels(body: _Body, right: FloatArray) -> Iterator[Finding]:
     No one turns the head so far that its right side is on the left of the body.
     """
     markers = body.context.all_markers
-    landmarks = {label for own in body.marker_set.landmarks.values() for label in own}
+    landmarks = {label for labels in body.marker_set.landmarks.values() for label in labels}
     for segment in ("torso", "pelvis"):
         for label in body.marker_set.segments.get(segment, ()):
             other = f"{'L' if label[:1].isupper() else 'l'}{label[1:]}"
             if label[:1].upper() != "R" or {label, other} & landmarks or not {label, other} <= set(markers.labels):
                 continue
             pair = markers.arranged([label, other])
-            each = cosine(pair[:, 0] - pair[:, 1], right)
-            if each < -CLEAR:
+            along = cosine(pair[:, 0] - pair[:, 1], right)
+            if along < -CLEAR:
                 where = body.context.at(markers=(label, other))
-                found = finding("L202", where, cosine=Quantity(each, "1", limit=-CLEAR))
+                found = finding("L202", where, cosine=Quantity(along, "1", limit=-CLEAR))
                 yield replace(found, severity=Severity.WARNING)
 
 
@@ -242,8 +244,8 @@ def _thighs(body: _Body) -> Iterator[Finding]:
             continue
         above = {}
         for part in ("thigh", "shank"):
-            own = set(marker_set.segments.get(f"{part}_{side}", ())) - joints
-            for label in sorted(own & set(markers.labels)):
+            of_thigh = set(marker_set.segments.get(f"{part}_{side}", ())) - joints
+            for label in sorted(of_thigh & set(markers.labels)):
                 heights = np.subtract(*markers.select((label, knee)).positions[..., 1].T)
                 heights = heights[np.isfinite(heights)]
                 above[part, label] = float(np.median(heights)) if heights.size else 0.0

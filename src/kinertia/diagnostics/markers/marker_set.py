@@ -74,15 +74,15 @@ def landmarks(context: RecordingContext) -> Iterator[Finding]:
 
 
 def _assumed(context: RecordingContext, marks: Landmarks) -> Iterator[Finding]:
-    for one in assumptions(marks):
-        labels = [label for name in one.lacking for label in marks.marker_set.landmarks.get(name, ())]
+    for assumption in assumptions(marks):
+        labels = [label for name in assumption.lacking for label in marks.marker_set.landmarks.get(name, ())]
         absent = nearest_labels([label for label in labels if label not in marks.markers], list(marks.markers))
         yield finding(
             "L107",
-            context.at(part=one.part),
-            Severity.WARNING if one.of_leg else None,
-            lacking=Quantity(", ".join(one.lacking)),
-            instead=Quantity(one.instead),
+            context.at(part=assumption.part),
+            Severity.WARNING if assumption.of_leg else None,
+            lacking=Quantity(", ".join(assumption.lacking)),
+            instead=Quantity(assumption.instead),
             labels=Quantity(with_nearest(absent) or "not in the marker set"),
         )
 
@@ -106,14 +106,14 @@ def _wands(context: RecordingContext, marks: Landmarks) -> Iterator[Finding]:
 
 
 def _legs(context: RecordingContext, marks: Landmarks) -> Iterator[Finding]:
-    for one in departures(marks):
-        limit = one.limit.apart if one.between_sides else one.limit.within
+    for departure in departures(marks):
+        limit = departure.limit.apart if departure.between_sides else departure.limit.within
         yield finding(
             "S209",
-            context.at(part=in_words(one.part)),
-            angle_rad=Quantity(abs(one.angle_rad), "rad", limit=limit, usual=(0.0, one.limit.usual)),
-            axis=Quantity(one.limit.name),
-            how=Quantity(one.how),
+            context.at(part=in_words(departure.part)),
+            angle_rad=Quantity(abs(departure.angle_rad), "rad", limit=limit, usual=(0.0, departure.limit.usual)),
+            axis=Quantity(departure.limit.name),
+            how=Quantity(departure.how),
         )
 
 

@@ -101,11 +101,11 @@ def _not_rigid(context: RecordingContext, markers: Markers, marker_set: MarkerSe
         worst = max(far)
         # a marker that is no landmark is more likely wrong, and one far from several others
         odd = max((worst.first, worst.second), key=lambda label: (label not in marks, count[label]))
-        own = [pair for pair in far if odd in (pair.first, pair.second)]
-        far = [pair for pair in far if pair not in own]
-        mates = dict.fromkeys(label for pair in sorted(own, reverse=True) for label in (pair.first, pair.second))
+        with_odd = [pair for pair in far if odd in (pair.first, pair.second)]
+        far = [pair for pair in far if pair not in with_odd]
+        mates = dict.fromkeys(label for pair in sorted(with_odd, reverse=True) for label in (pair.first, pair.second))
         involved = (odd, *(label for label in mates if label != odd))
-        if worst.change_m < in_any_case and not any(_elsewhere(markers, marker_set, one) for one in involved):
+        if worst.change_m < in_any_case and not any(_elsewhere(markers, marker_set, suspect) for suspect in involved):
             continue
         evidence = {
             "change_m": Quantity(worst.change_m, "m", limit=worst.limit_m, usual=_SEGMENT_M.usual),
@@ -117,11 +117,13 @@ def _not_rigid(context: RecordingContext, markers: Markers, marker_set: MarkerSe
 
 def _elsewhere(markers: Markers, marker_set: MarkerSet, odd: str) -> bool:
     """Return whether this marker moves with another segment of the legs or the pelvis."""
-    segments = {name: [one for one in own if one in markers.labels] for name, own in marker_set.segments.items()}
+    segments = {
+        name: [label for label in labels if label in markers.labels] for name, labels in marker_set.segments.items()
+    }
     changes = {
-        name: np.median(_changes_m(markers, [(odd, mate) for mate in own if mate != odd]))
-        for name, own in segments.items()
-        if set(own) - {odd} and (odd in own or not name.startswith(_OWN_WAY))
+        name: np.median(_changes_m(markers, [(odd, mate) for mate in labels if mate != odd]))
+        for name, labels in segments.items()
+        if set(labels) - {odd} and (odd in labels or not name.startswith(_OWN_WAY))
     }
     mine = max((change for name, change in changes.items() if odd in segments[name]), default=0.0)
     return any(change < _ELSEWHERE * mine for change in changes.values())
@@ -153,24 +155,24 @@ def _crossed(context: RecordingContext, markers: Markers, marker_set: MarkerSet,
             for a in "rl"
             for b in "rl"
         }
-        own = min(changes["r", "r"], changes["l", "l"])
+        uncrossed = min(changes["r", "r"], changes["l", "l"])
         others = max(changes["r", "l"], changes["l", "r"])
         measured += bool(np.isfinite([*changes.values()]).all())
-        if np.isfinite([*changes.values()]).all() and others < _CROSSED * own and own > least_m:
-            crossed[upper, lower] = own, others
+        if np.isfinite([*changes.values()]).all() and others < _CROSSED * uncrossed and uncrossed > least_m:
+            crossed[upper, lower] = uncrossed, others
     if not crossed:
         return
     # shanks that are swapped go with the other leg's thighs and feet; with one of them unseen, either may be swapped
     ends = [name for pair in crossed for name in pair if name != "shank"]
     parts = ["shank"] if len(crossed) == 2 else [*ends, *(["shank"] if measured < 2 else [])]
-    own, others = next(iter(crossed.values()))
+    uncrossed, others = next(iter(crossed.values()))
     involved = [f"{name}_{side}" for name in ("shank", *ends) for side in "rl"]
     labels = [label for name in involved for label in marker_set.segments[name] if label in markers.labels]
     yield finding(
         "L214",
         context.at(markers=tuple(dict.fromkeys(labels))),
-        own_change_m=Quantity(own, "m", limit=least_m),
-        crossed_change_m=Quantity(others, "m", limit=_CROSSED * own),
+        own_change_m=Quantity(uncrossed, "m", limit=least_m),
+        crossed_change_m=Quantity(others, "m", limit=_CROSSED * uncrossed),
         segments=Quantity(" or ".join(_SEVERAL[part] for part in parts)),
     )
 
@@ -179,7 +181,7 @@ def _neighbours_change_m(markers: Markers, marker_set: MarkerSet, upper: str, lo
     """Return the median change (m) of the distances between markers of two segments; NaN where one has none."""
     here = set(markers.labels)
     above, below = ([label for label in marker_set.segments.get(name, ()) if label in here] for name in (upper, lower))
-    changes = _changes_m(markers, [(one, other) for one in above for other in below], np.nan)
+    changes = _changes_m(markers, [(above_label, other) for above_label in above for other in below], np.nan)
     return float(np.nanmedian(changes)) if np.isfinite(changes).any() else np.nan
 
 
@@ -189,22 +191,22 @@ def _pairs(markers: Markers, marker_set: MarkerSet, noise_m: float) -> list[_Pai
     named: list[tuple[str, str, str, float]] = []
     for name, labels in marker_set.segments.items():
         if not name.startswith(_SOFT):
-            own = [label for label in labels if label in here]
-            named += [(one, other, name, within) for one, other in combinations(own, 2)]
-    for one, other in _JOINED:
+            present = [label for label in labels if label in here]
+            named += [(first, other, name, within) for first, other in combinations(present, 2)]
+    for upper, other in _JOINED:
         for side in "rl":
-            both = [marker_set.landmarks.get(f"{name}_{side}", ()) for name in (one, other)]
+            both = [marker_set.landmarks.get(f"{name}_{side}", ()) for name in (upper, other)]
             if all(labels and labels[0] in here for labels in both):
-                named.append((both[0][0], both[1][0], f"{one.partition('_')[0]}_{side}", across))
-    changes = _changes_m(markers, [(one, other) for one, other, *_ in named])
+                named.append((both[0][0], both[1][0], f"{upper.partition('_')[0]}_{side}", across))
+    changes = _changes_m(markers, [(first, other) for first, other, *_ in named])
     return [_Pair(float(change), *which) for change, which in zip(changes, named, strict=True)]
 
 
 def _changes_m(markers: Markers, pairs: Sequence[tuple[str, str]], unknown: float = 0.0) -> FloatArray:
     """Return by how much (p,) m the distance of each pair of markers changes; `unknown` where few frames show both."""
     place = {label: column for column, label in enumerate(markers.labels)}
-    one, other = ([place[pair[end]] for pair in pairs] for end in (0, 1))
-    apart: FloatArray = np.linalg.norm(markers.positions[:, one] - markers.positions[:, other], axis=2)
+    first, other = ([place[pair[end]] for pair in pairs] for end in (0, 1))
+    apart: FloatArray = np.linalg.norm(markers.positions[:, first] - markers.positions[:, other], axis=2)
     seen = np.isfinite(apart)
     known = np.count_nonzero(seen, axis=0) >= _FEWEST_FRAMES
     always = known & seen.all(axis=0)

@@ -105,16 +105,16 @@ def _coinciding(context: RecordingContext) -> Iterator[Finding]:
     used = [k for k, label in enumerate(markers.labels) if label in context.segment_of_label]
     every = max(1, int(_COINCIDING_S * markers.rate_hz / 2))
     some = markers.positions[::every, used]
-    for k, one in enumerate(used):
+    for k, column in enumerate(used):
         near = (np.linalg.norm(some[:, k + 1 :] - some[:, k, None], axis=2) < _COINCIDING_M).any(axis=0)
         for other in np.array(used)[k + 1 :][near].tolist():
-            apart = np.linalg.norm(markers.positions[:, one] - markers.positions[:, other], axis=1)
+            apart = np.linalg.norm(markers.positions[:, column] - markers.positions[:, other], axis=1)
             same = np.asarray(apart < _COINCIDING_M)
             span_s = windows(markers.time, same)[0]
             if span_s[1] - span_s[0] >= _COINCIDING_S:
                 yield finding(
                     "M115",
-                    context.at(markers=(markers.labels[one], markers.labels[other]), span_s=span_s),
+                    context.at(markers=(markers.labels[column], markers.labels[other]), span_s=span_s),
                     Severity.ERROR if same.sum() > _MOSTLY * np.isfinite(apart).sum() else None,
                     distance_m=Quantity(float(np.median(apart[same])), "m", limit=_COINCIDING_M),
                 )
@@ -124,15 +124,15 @@ def _coinciding(context: RecordingContext) -> Iterator[Finding]:
 def visible(context: RecordingContext) -> Iterator[Finding]:
     """Report M101 to M104: one finding per marker (M102 and M103 over the measured window), M104 one per bare
     segment."""
-    for one in visibility(context.markers):
-        if one.share == 0.0:
-            yield finding("M101", context.at(markers=(one.label,)), share=Quantity(0.0, "1"))
-    for one in visibility(_in_window(context)):
-        where = context.at(markers=(one.label,))
-        if 0.0 < one.share < _RARE:
-            yield finding("M102", where, share=Quantity(one.share, "1", limit=_RARE))
-        elif one.share > 0.0 and one.longest_gap_s > LONGEST_BRIDGE_S:
-            yield finding("M103", where, gap_s=Quantity(one.longest_gap_s, "s", limit=LONGEST_BRIDGE_S))
+    for marker in visibility(context.markers):
+        if marker.share == 0.0:
+            yield finding("M101", context.at(markers=(marker.label,)), share=Quantity(0.0, "1"))
+    for marker in visibility(_in_window(context)):
+        where = context.at(markers=(marker.label,))
+        if 0.0 < marker.share < _RARE:
+            yield finding("M102", where, share=Quantity(marker.share, "1", limit=_RARE))
+        elif marker.share > 0.0 and marker.longest_gap_s > LONGEST_BRIDGE_S:
+            yield finding("M103", where, gap_s=Quantity(marker.longest_gap_s, "s", limit=LONGEST_BRIDGE_S))
     yield from _bare_segments(context)
 
 
@@ -168,9 +168,9 @@ def absent_markers(context: PersonContext) -> Iterator[Finding]:
     """Report M105: markers of the static trial, or else of the model, that a trial lacks."""
     if context.marker_set is None:
         return
-    reference = [label for own in context.marker_set.segments.values() for label in own]
+    reference = [label for labels in context.marker_set.segments.values() for label in labels]
     if context.model is None:
-        shown = {label for one in context.standing[:1] for label in one.all_markers.labels}
+        shown = {label for recording in context.standing[:1] for label in recording.all_markers.labels}
         reference = [label for label in reference if label in shown]
     for trial in context.trials:
         absent = tuple(label for label in reference if label not in trial.all_markers.labels)
@@ -212,7 +212,7 @@ def over_smoothed(context: RecordingContext) -> Iterator[Finding]:
 
 def _quick_hz(context: RecordingContext) -> float:
     """Return the frequency above which motion is quick, lower for somebody whose steps last long."""
-    stances = [one.end_s - one.start_s for one in context.contacts if one.is_step]
+    stances = [contact.end_s - contact.start_s for contact in context.contacts if contact.is_step]
     return min(_QUICK_HZ, _QUICK_OF_STANCE / float(np.median(stances))) if stances else _QUICK_HZ
 
 
@@ -237,9 +237,9 @@ def _distances_change_m(markers: Markers, owners: Mapping[str, str]) -> float:
     """Return how much (m) the distance of two markers of a shank changes, median of pairs; infinite without a pair."""
     ranges = []
     for side in "rl":
-        own = [k for k, label in enumerate(markers.labels) if owners.get(label) == f"shank_{side}"]
-        for one, other in combinations(own, 2):
-            apart = np.linalg.norm(markers.positions[:, one] - markers.positions[:, other], axis=1)
+        of_shank = [k for k, label in enumerate(markers.labels) if owners.get(label) == f"shank_{side}"]
+        for column, other in combinations(of_shank, 2):
+            apart = np.linalg.norm(markers.positions[:, column] - markers.positions[:, other], axis=1)
             apart = apart[np.isfinite(apart)]
             ranges += [float(np.ptp(np.quantile(apart, (0.02, 0.98))))] if apart.size else []
     return float(np.median(ranges)) if ranges else np.inf

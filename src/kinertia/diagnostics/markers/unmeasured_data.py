@@ -223,14 +223,14 @@ def _in_pelvis(place: Mapping[str, FloatArray], marker_set: MarkerSet) -> dict[s
     found, frames = {}, None
     others = {label for name, labels in marker_set.segments.items() if name != "pelvis" for label in labels}
     for label in others & set(place):
-        own = place[label][shown]
-        seen = np.isfinite(own).all(axis=1)
-        away = np.linalg.norm(own[seen, None] - origins[seen], axis=2)
+        candidate = place[label][shown]
+        seen = np.isfinite(candidate).all(axis=1)
+        away = np.linalg.norm(candidate[seen, None] - origins[seen], axis=2)
         if seen.sum() < _FEWEST or np.ptp(away[:, -1]) > _NEAR_M or away.std(axis=0).min() > _DISTANCE_M:
             continue
         frames = frames or (_frames(points), _best_fit(pelvis))  # few recordings need them
         for origin, axes in frames:
-            local = np.einsum("ntji,ntj->nti", axes[seen], own[seen, None] - origin[seen])
+            local = np.einsum("ntji,ntj->nti", axes[seen], candidate[seen, None] - origin[seen])
             sd_m = float(local.std(axis=0).max(axis=1).min())
             if sd_m < _EXACT_M:
                 found[label] = _Computed(tuple(corners), sd_m)
@@ -239,8 +239,8 @@ def _in_pelvis(place: Mapping[str, FloatArray], marker_set: MarkerSet) -> dict[s
 
 def _frames(points: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return origins (n, t, 3) and axes (n, t, 3, 3) through all triples of points (n, p, 3) that are not in line."""
-    one, two, three = np.array(list(permutations(range(points.shape[1]), 3))).T
-    origin = points[:, one]
+    first, two, three = np.array(list(permutations(range(points.shape[1]), 3))).T
+    origin = points[:, first]
     x, across = points[:, two] - origin, points[:, three] - origin
     lengths = np.linalg.norm(x, axis=2) * np.linalg.norm(across, axis=2)
     normal = np.cross(x, across)
@@ -267,9 +267,9 @@ def _halfway(place: Mapping[str, FloatArray], marker_set: MarkerSet) -> dict[str
     for joint in (f"{name}_{side}" for name in _JOINTS for side in "rl"):
         head, _, side = joint.partition("_")
         ends = [marker_set.landmarks.get(f"{head}_{which}_{side}", ()) for which in ("lateral", "medial")]
-        if any(len(own) != 1 or own[0] not in place for own in ends):
+        if any(len(end) != 1 or end[0] not in place for end in ends):
             continue
-        lateral, medial = (place[own[0]] for own in ends)
+        lateral, medial = (place[end[0]] for end in ends)
         for label in set(marker_set.labels) & set(place) - {ends[0][0], ends[1][0]}:
             from_lateral, along = place[label] - lateral, medial - lateral
             shown = np.isfinite(from_lateral).all(axis=1) & np.isfinite(along).all(axis=1)

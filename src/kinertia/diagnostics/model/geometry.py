@@ -163,7 +163,7 @@ def _usual(neutral: NeutralJoints, body: str) -> np.ndarray:
     """Return the usual axis (3,) of this foot, in ground, where forward follows from up and right."""
     forward, up, right = _USUAL
     to_right = np.zeros(3)
-    across = sum((neutral.centres[one] - neutral.centres[other] for one, other in neutral.pairs), np.zeros(3))
+    across = sum((neutral.centres[first] - neutral.centres[other] for first, other in neutral.pairs), np.zeros(3))
     to_right[neutral.sideways] = np.sign(across[neutral.sideways])
     ahead = np.cross([0.0, 1.0, 0.0], to_right)
     inward = right if body.endswith("_r") else -right

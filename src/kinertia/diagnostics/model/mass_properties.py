@@ -222,14 +222,14 @@ def sides(context: PersonContext) -> Iterator[Finding]:
     """Report O214: pairs of bodies that do not mirror each other."""
     if context.model is None:
         return
-    for one in side_differences(context.model.bsp):
+    for difference in side_differences(context.model.bsp):
         yield finding(
             "O214",
-            Where(part=one.body),
+            Where(part=difference.body),
             advice(context),
-            mass_share=Quantity(one.mass_share, "1", limit=SIDE_MASS),
-            com_m=Quantity(one.com_m, "m", limit=SIDE_COM_M),
-            moment_share=Quantity(one.moment_share, "1", limit=SIDE_MOMENT),
+            mass_share=Quantity(difference.mass_share, "1", limit=SIDE_MASS),
+            com_m=Quantity(difference.com_m, "m", limit=SIDE_COM_M),
+            moment_share=Quantity(difference.moment_share, "1", limit=SIDE_MOMENT),
         )
 
 

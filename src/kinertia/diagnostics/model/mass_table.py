@@ -59,7 +59,7 @@ class ModelCheck:
         ]
         if massless:
             facts.append(("without mass", ", ".join(massless)))
-        joined = [f"{name}: {' + '.join(own)}" for name, own in self.segments.bodies.items() if len(own) > 1]
+        joined = [f"{name}: {' + '.join(bodies)}" for name, bodies in self.segments.bodies.items() if len(bodies) > 1]
         return [*facts, *([("combined", "; ".join(joined))] if joined and self.literature else [])]
 
     @property
@@ -131,9 +131,9 @@ def side_differences(bsp: BodySegmentParameters) -> list[SideDifference]:
         mean = np.maximum((np.abs(table[i]) + np.abs(other[i])) / 2, 1e-12)
         change = np.abs(table[i] - other[i])
         com_m, moment = float(np.linalg.norm(change[1:4])), float((change[4:7] / mean[4:7]).max())
-        one = SideDifference(name[:-2], float(change[0] / mean[0]), com_m, moment)
-        if one.mass_share > SIDE_MASS or one.com_m > SIDE_COM_M or one.moment_share > SIDE_MOMENT:
-            found.append(one)
+        difference = SideDifference(name[:-2], float(change[0] / mean[0]), com_m, moment)
+        if difference.mass_share > SIDE_MASS or difference.com_m > SIDE_COM_M or difference.moment_share > SIDE_MOMENT:
+            found.append(difference)
     return found
 
 

@@ -109,8 +109,8 @@ def moved_markers(before: Skeleton, after: Skeleton, trials: Sequence[Markers]) 
 def _mirrored(places: Markers, trial: Markers, marker_set: MarkerSet) -> Quantity | None:
     """Return how many times worse the model fits the markers than its mirror image does, where that is decisive."""
     for names, (fewest, limit) in _ARRANGED.items():
-        own = [marker_set.segments.get(name, ()) for name in names]
-        parts = [[label for label in labels if label in trial.labels] for labels in own]
+        of_segments = [marker_set.segments.get(name, ()) for name in names]
+        parts = [[label for label in labels if label in trial.labels] for labels in of_segments]
         labels = [label for part in parts for label in part]
         person = trial.select(labels).positions
         whole = np.flatnonzero(np.isfinite(person).all(axis=(1, 2)))
@@ -130,10 +130,10 @@ def _mirror_ratio(model: FloatArray, person: FloatArray) -> float:
 
     The singular values of both points' product give the least squares (Kabsch 1976, Acta Cryst A 32:922).
     """
-    one, other = model - model.mean(axis=0), person - person.mean(axis=1, keepdims=True)
-    left, values, right = np.linalg.svd(one.T @ other)
+    centred, other = model - model.mean(axis=0), person - person.mean(axis=1, keepdims=True)
+    left, values, right = np.linalg.svd(centred.T @ other)
     sign = np.sign(np.linalg.det(left @ right))
-    squares = np.square(one).sum() + np.square(other).sum(axis=(1, 2))
+    squares = np.square(centred).sum() + np.square(other).sum(axis=(1, 2))
     turned = squares - 2.0 * (values[:, 0] + values[:, 1] + sign * values[:, 2])
     mirrored = squares - 2.0 * (values[:, 0] + values[:, 1] - sign * values[:, 2])
     return float(np.median(np.sqrt(np.maximum(turned, 0.0) / np.maximum(mirrored, 1e-12))))

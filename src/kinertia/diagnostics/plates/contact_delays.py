@@ -49,13 +49,15 @@ def stance_durations(context: RecordingContext) -> Iterator[Hypothesis]:
     plates, feet, contacts = context.whole_loads, context.foot_trajectories, context.whole_contacts
     if plates is None or context.plates is None or feet is None:
         return
-    last_row, walked = len(plates.time) - 1, [one for one in contacts if _several_steps(one, plates)]
+    last_row, walked = len(plates.time) - 1, [contact for contact in contacts if _several_steps(contact, plates)]
     loaded = [
         float(plates.time[last] - plates.time[first])
         for p in range(len(plates.names))
         for first, last in loads_on(plates, p)
         if first > 0 and last < last_row
-        if not any(one.plate == p and plates.time[first] <= one.time[0] <= plates.time[last] for one in walked)
+        if not any(
+            contact.plate == p and plates.time[first] <= contact.time[0] <= plates.time[last] for contact in walked
+        )
     ]
     standing = _stances(contacts, feet)
     if not loaded or not standing:
@@ -81,14 +83,14 @@ def _stances(contacts: Sequence[PlateContact], feet: Feet) -> list[float]:
     """Return how long (s) feet stand while they are loaded, or all stance phases where none is loaded. Before and
     after, the person may stand on a box or turn round.
     """
-    loaded = [(one.foot, one.time[0], one.time[-1]) for one in contacts]
+    loaded = [(contact.foot, contact.time[0], contact.time[-1]) for contact in contacts]
     whole = [(k, start, end) for k, foot in enumerate(feet) for start, end, all_of_it in foot.stance_spans if all_of_it]
-    own = [
+    of_steps = [
         end - start
         for k, start, end in whole
         if any(k == foot and start < last and end > first for foot, first, last in loaded)
     ]
-    return own or [end - start for _, start, end in whole]
+    return of_steps or [end - start for _, start, end in whole]
 
 
 def _several_steps(contact: PlateContact, plates: PlateLoads) -> bool:
@@ -117,7 +119,7 @@ def contact_delays(context: RecordingContext) -> Iterator[Hypothesis]:
     if abs(delay) <= DELAY_S or min(delays.median_s * np.sign(delay)) < DELAY_S / 2:
         return
     corrected = replace(plates, time=plates.time - delay)
-    far_m = max((one.distance_m for one in contacts_of(corrected, feet)), default=np.inf)
+    far_m = max((contact.distance_m for contact in contacts_of(corrected, feet)), default=np.inf)
     measured = {
         "delay_s": Quantity(delay, "s", limit=DELAY_S, usual=DELAY_S.usual),
         "begin_s": Quantity(float(delays.median_s[0]), "s"),
@@ -294,4 +296,4 @@ def _best(
     for value in values:
         moved = replace(plates, time=corrected(plates.time, float(value)))
         tried.append(_Best(float(value), ContactFit.of(contacts_of(moved, feet, point), feet)))
-    return min(tried, key=lambda one: (one.fit.far_m >= FITS_M, one.fit.delay_rms_s))
+    return min(tried, key=lambda candidate: (candidate.fit.far_m >= FITS_M, candidate.fit.delay_rms_s))

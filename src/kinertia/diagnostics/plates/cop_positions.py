@@ -112,8 +112,8 @@ def loads_and_feet(context: RecordingContext) -> Iterator[Finding]:
         )
     )
     if hypotheses:
-        ranked = sorted(hypotheses, key=lambda one: one.misfit(feet))
-        yield _with_runners_up([one.finding for one in ranked])
+        ranked = sorted(hypotheses, key=lambda hypothesis: hypothesis.misfit(feet))
+        yield _with_runners_up([hypothesis.finding for hypothesis in ranked])
         return
     if goes_forwards(context) and shows_feet_equally(context):
         yield from _offset(context)
@@ -121,7 +121,11 @@ def loads_and_feet(context: RecordingContext) -> Iterator[Finding]:
 
 def _with_runners_up(ranked: Sequence[Finding]) -> Finding:
     best = ranked[0]
-    others = {one.code: f"{one.code} {one.message}" for one in ranked[1:] if one.code != best.code}
+    others = {
+        hypothesis.code: f"{hypothesis.code} {hypothesis.message}"
+        for hypothesis in ranked[1:]
+        if hypothesis.code != best.code
+    }
     return replace(best, causes=(*(best.causes or rule(best.code).causes), *others.values())) if others else best
 
 
@@ -147,11 +151,11 @@ def _displaced(context: RecordingContext) -> Iterator[Hypothesis]:
     plates = context.plates
     assert plates is not None
     # a load of both feet is under neither (P276)
-    loads = [one for one in context.contacts if not one.between]
-    far = [one for one in loads if one.distance_m > FAR_M]
+    loads = [contact for contact in context.contacts if not contact.between]
+    far = [load for load in loads if load.distance_m > FAR_M]
     if not far or len(far) < len(loads) / 2:
         return
-    offsets = np.array([one.own_offset_m for one in loads])
+    offsets = np.array([load.own_offset_m for load in loads])
     mean = offsets.mean(axis=0)
     if np.abs(offsets - mean).max() < FAR_M / 2:
         offset = Quantity((float(mean[0]), float(mean[1])), "m", limit=FAR_M)
@@ -170,7 +174,7 @@ def _displaced(context: RecordingContext) -> Iterator[Hypothesis]:
 def _offset(context: RecordingContext) -> Iterator[Finding]:
     """Report P243: the loads of right and left are displaced in the same direction of the laboratory."""
     contacts = one_foot_loads(context)
-    means = [[_foot_offset_m(one) for one in contacts if one.foot == foot] for foot in range(2)]
+    means = [[_foot_offset_m(contact) for contact in contacts if contact.foot == foot] for foot in range(2)]
     if not all(means):
         return
     mean = (np.mean(means[0], axis=0) + np.mean(means[1], axis=0)) / 2
@@ -195,16 +199,16 @@ def _ends(context: RecordingContext, contacts: Sequence[PlateContact]) -> Iterat
     """Report P243: loads that begin behind the heel or end in front of the toes, as happens first with an offset along
     the foot."""
     # both of two contacts, so that a second foot on one plate does not count
-    ends = np.sort([one.ends_m for one in contacts], axis=0)
+    ends = np.sort([contact.ends_m for contact in contacts], axis=0)
     begin, end = float(ends[len(ends) // 2, 0]), float(ends[(len(ends) - 1) // 2, 1])
-    steps = [one.ends_m for one in contacts if np.isfinite(one.end_s - one.start_s)]
+    steps = [contact.ends_m for contact in contacts if np.isfinite(contact.end_s - contact.start_s)]
     excess = 0.0
     if begin < _BEGIN_M:
         excess = begin - _USUAL_BEGIN_M[0]
     elif end > _END_M:
         excess = end - _USUAL_END_M[1]
     elif steps:
-        begin, end = (float(each) for each in np.mean(steps, axis=0))
+        begin, end = (float(mean_end) for mean_end in np.mean(steps, axis=0))
         excess = _excess_of_both(begin, end)
     if excess:
         yield _origin(
@@ -239,8 +243,10 @@ def forces_keep_time(context: RecordingContext) -> bool:
     """Return whether vertical velocities show, without strides, that the forces are not delayed."""
     if context.has_strides:
         return False
-    found = [one for part in context.velocities for one in vertical_match_of(part) if one.residual <= LARGEST_RESIDUAL]
-    return bool(found) and max(abs(one.delay_s) for one in found) < _DELAY_S
+    found = [
+        match for part in context.velocities for match in vertical_match_of(part) if match.residual <= LARGEST_RESIDUAL
+    ]
+    return bool(found) and max(abs(match.delay_s) for match in found) < _DELAY_S
 
 
 @check("P251", "P252", unless=NEEDS_LOADS_UNDER_FEET, fixed=_FIXED_M, backwards=_BACKWARDS, forwards=_FORWARDS)
@@ -251,21 +257,21 @@ def cop_progression(context: RecordingContext) -> Iterator[Finding]:
     plates, feet = context.plates, context.foot_trajectories
     if plates is None or feet is None or context.is_static:
         return
-    steps = [one for one in heel_steps(context) if one.is_step]
+    steps = [step for step in heel_steps(context) if step.is_step]
     progression: dict[int, float] = {}
-    for p in sorted({one.plate for one in steps}):
-        own = [one for one in steps if one.plate == p]
-        range_m = max(float(np.ptp(one.place, axis=0).max()) for one in own)
+    for p in sorted({step.plate for step in steps}):
+        of_plate = [step for step in steps if step.plate == p]
+        range_m = max(float(np.ptp(step.place, axis=0).max()) for step in of_plate)
         if range_m < _FIXED_M:
             yield finding("P251", context.at(plate=plates.names[p]), range_m=Quantity(range_m, "m", limit=_FIXED_M))
-        progression[p] = float(np.median([_progression_m(one, feet[one.foot]) for one in own]))
-    length_m = float(np.mean([one.length_m for one in feet]))
-    if all(each <= _FORWARDS * length_m for each in progression.values()):
+        progression[p] = float(np.median([_progression_m(step, feet[step.foot]) for step in of_plate]))
+    length_m = float(np.mean([foot.length_m for foot in feet]))
+    if all(progressed_m <= _FORWARDS * length_m for progressed_m in progression.values()):
         return
     usual = (_USUAL[0] * length_m, _USUAL[1] * length_m)
-    for p, each in progression.items():
-        if each < _BACKWARDS * length_m:
-            measured = Quantity(each, "m", limit=_BACKWARDS * length_m, usual=usual)
+    for p, progressed_m in progression.items():
+        if progressed_m < _BACKWARDS * length_m:
+            measured = Quantity(progressed_m, "m", limit=_BACKWARDS * length_m, usual=usual)
             yield finding("P252", context.at(plate=plates.names[p]), progression_m=measured)
 
 
@@ -287,15 +293,19 @@ def heel_steps(context: RecordingContext) -> list[PlateContact]:
     forefoot, in strides that do not go backwards."""
     if not context.has_strides or not goes_forwards(context):
         return []
-    return [one for one in one_foot_loads(context) if not one.trajectory.lands_on_forefoot(one.start_s, one.end_s)]
+    return [
+        contact
+        for contact in one_foot_loads(context)
+        if not contact.trajectory.lands_on_forefoot(contact.start_s, contact.end_s)
+    ]
 
 
 def one_foot_loads(context: RecordingContext) -> list[PlateContact]:
     """Return the loads without those that both feet bear on one plate; if these seem to be most, the loads are at a
     wrong position instead, and count."""
-    shared = {id(one.contact) for one in context.shared_loads}
-    own = [one for one in context.contacts if id(one) not in shared]
-    return own if 2 * len(own) >= len(context.contacts) else list(context.contacts)
+    shared = {id(load.contact) for load in context.shared_loads}
+    unshared = [contact for contact in context.contacts if id(contact) not in shared]
+    return unshared if 2 * len(unshared) >= len(context.contacts) else list(context.contacts)
 
 
 def shows_feet_equally(context: RecordingContext) -> bool:

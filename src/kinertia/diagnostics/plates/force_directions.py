@@ -92,23 +92,23 @@ def force_directions(context: RecordingContext) -> Iterator[Finding]:
     against = [axis for axis in HORIZONTAL if correlations[axis] < _OPPOSED and not _one_zero_off(trial, parts, axis)]
     best, others, both = [], [], []
     for axis in HORIZONTAL:
-        own = [*_reversed_plate(context, plates, residuals[axis], axis)] if context.has_strides else []
+        explanations = [*_reversed_plate(context, plates, residuals[axis], axis)] if context.has_strides else []
         if axis in against:
-            own.append(_reversed_axis(context, residuals[axis], correlations[axis], axis))
-        own.sort(key=lambda one: one.residual_m_s)
-        best += own[:1]
-        others += own[1:]
-        both.append(own[0].residual_m_s if own else residuals[axis].as_read)
+            explanations.append(_reversed_axis(context, residuals[axis], correlations[axis], axis))
+        explanations.sort(key=lambda explanation: explanation.residual_m_s)
+        best += explanations[:1]
+        others += explanations[1:]
+        both.append(explanations[0].residual_m_s if explanations else residuals[axis].as_read)
     of_both = _rotated(context, changes, residuals, correlations, against), _misread_plate(context, plates, residuals)
-    about_both = sorted(filter(None, of_both), key=lambda one: one.residual_m_s)
+    about_both = sorted(filter(None, of_both), key=lambda explanation: explanation.residual_m_s)
     if about_both and (not best or about_both[0].residual_m_s <= float(np.linalg.norm(both))):
         best, others = about_both[:1], [*about_both[1:], *best, *others]
     else:
         others += about_both
-    for one in best:
-        causes = one.found.causes or rule(one.found.code).causes
+    for explanation in best:
+        causes = explanation.found.causes or rule(explanation.found.code).causes
         rivals = tuple(f"{other.found.code} {other.found.message}" for other in others)
-        yield replace(one.found, causes=(*causes, *rivals))
+        yield replace(explanation.found, causes=(*causes, *rivals))
 
 
 def _rotated(
@@ -122,14 +122,14 @@ def _rotated(
     it."""
     angle_deg, strength = _angle(changes)
     if len(against) == len(HORIZONTAL):
-        angle, residual = np.pi, float(np.linalg.norm([one.all_reversed for one in residuals.values()]))
+        angle, residual = np.pi, float(np.linalg.norm([of_axis.all_reversed for of_axis in residuals.values()]))
     elif context.has_strides and strength > _CLEAR_ROTATION and abs(angle_deg) > _ROTATED_DEG:
         angle = float(np.radians(90 * round(angle_deg / 90)))
         residual = rotated_residual(context.velocities, angle)
         # beside an opposed axis, one that agrees with the markers mostly shows that the forces are not rotated
         enough = -_OPPOSED if against else _CLEAR
-        by_signs = np.linalg.norm([min(one.as_read, one.all_reversed) for one in residuals.values()])
-        if any(one > enough for one in correlations.values()) and residual > CLEARLY_BEST * by_signs:
+        by_signs = np.linalg.norm([min(of_axis.as_read, of_axis.all_reversed) for of_axis in residuals.values()])
+        if any(correlation > enough for correlation in correlations.values()) and residual > CLEARLY_BEST * by_signs:
             return None
     else:
         return None
@@ -159,7 +159,10 @@ def _reversed_axis(context: RecordingContext, residual: VelocityResidual, correl
 def vertical_signs(context: RecordingContext) -> Iterator[Finding]:
     """Report P238: a plate that was reversed when it was read, since its vertical force pointed down, unlike others',
     and that pushes first and brakes later since."""
-    plates, reversed_ = context.plates, {one.where.plate for one in context.recording.findings if one.code == "F157"}
+    plates, reversed_ = (
+        context.plates,
+        {reported.where.plate for reported in context.recording.findings if reported.code == "F157"},
+    )
     if plates is None or context.is_static:
         return
     pushes = {name: push_share(plates, p, context.travel) for p, name in enumerate(plates.names)}
@@ -214,14 +217,17 @@ def _misread_plate(
     With this undone, the forces must agree with the markers much better, and better than if any sign or zero is
     corrected.
     """
-    as_read = float(np.linalg.norm([one.as_read for one in residuals.values()]))
+    as_read = float(np.linalg.norm([of_axis.as_read for of_axis in residuals.values()]))
     if len(plates.names) < 2 or not context.has_strides or as_read < _LEAST_REVERSED_M_S:
         return None
     shown = (context.velocities, _by_centre(context.velocities))
     left = min((misread_plate_residuals(plates.time, plates.force, parts) for parts in shown), key=np.min)
     best = int(np.argmin(left.min(axis=1)))
-    signs = [min(one.all_reversed, one.without_trend, *one.plate_reversed, one.as_read) for one in residuals.values()]
-    zeros = [min(sign, *one.plate_zeroed) for sign, one in zip(signs, residuals.values(), strict=True)]
+    signs = [
+        min(of_axis.all_reversed, of_axis.without_trend, *of_axis.plate_reversed, of_axis.as_read)
+        for of_axis in residuals.values()
+    ]
+    zeros = [min(sign, *of_axis.plate_zeroed) for sign, of_axis in zip(signs, residuals.values(), strict=True)]
     rivals = float(np.linalg.norm(signs)), float(np.linalg.norm(zeros))
     limit = min(_ONE_MISREAD * as_read, CLEARLY_BEST * rivals[0], rivals[1])
     residual = float(left.min())
@@ -244,8 +250,8 @@ def _best_explained(plates: PlateLoads, parts: Sequence[ForceVelocity], axis: in
     shown = [parts]
     if max(span_s(part.time) for part in parts) >= _LONG_WINDOW_S:
         shown.append(_by_centre(parts))
-    found = [VelocityResidual.of(plates.time, plates.force, each, axis) for each in shown]
-    return min(found, key=lambda one: min(one.as_read, float(one.plate_reversed.min())))
+    found = [VelocityResidual.of(plates.time, plates.force, velocity, axis) for velocity in shown]
+    return min(found, key=lambda candidate: min(candidate.as_read, float(candidate.plate_reversed.min())))
 
 
 def _by_centre(parts: Sequence[ForceVelocity]) -> Sequence[ForceVelocity]:
@@ -321,7 +327,7 @@ def _peak_of_weak_loads(plates: PlateLoads) -> float | None:
     A plate that no one steps on shows noise of up to some newtons, and perhaps an offset or a drift.
     """
     unloaded = plates.unloaded or ()
-    peak = max((one.peak_n for one in unloaded), default=0.0)
+    peak = max((reading.peak_n for reading in unloaded), default=0.0)
     if plates.force.any() or not _WEAKEST_N < peak < LOAD_THRESHOLD_N:
         return None
-    return peak if any(one.like_steps and one.peak_n > _WEAKEST_N for one in unloaded) else None
+    return peak if any(reading.like_steps and reading.peak_n > _WEAKEST_N for reading in unloaded) else None

@@ -91,8 +91,8 @@ def trial_delay(context: RecordingContext) -> TrialDelay | None:
         if span_s(part.time) < _LEAST_WINDOW_S:
             continue
         both = vertical_match_of(part)
-        if both and max(one.residual for one in both) <= LARGEST_RESIDUAL:
-            found.append([one.delay_s for one in both])
+        if both and max(match.residual for match in both) <= LARGEST_RESIDUAL:
+            found.append([match.delay_s for match in both])
             spans.append(span_s(part.time))
     if not found:
         return None
@@ -104,29 +104,29 @@ def trial_delay(context: RecordingContext) -> TrialDelay | None:
 def trial_delays(person: PersonContext) -> Iterator[Finding]:
     """Report T213: trials whose delay differs from the other trials'."""
     if len(person.trials) > 1:
-        yield from uneven_delays([trial_delay(one) for one in person.trials])
+        yield from uneven_delays([trial_delay(trial) for trial in person.trials])
 
 
 def uneven_delays(delays: Sequence[TrialDelay | None]) -> Iterator[Finding]:
     """Report T213: each trial whose delay is far from the median of three and more; of two that differ both, since it
     is unknown which of them is wrong.
     """
-    known = [one for one in delays if one is not None]
+    known = [delay for delay in delays if delay is not None]
     if len(known) < 2:
         return
-    values = np.array([[one.by_pelvis_s, one.by_markers_s] for one in known])
+    values = np.array([[delay.by_pelvis_s, delay.by_markers_s] for delay in known])
     usual = values[::-1] if len(known) == 2 else np.broadcast_to(np.median(values, axis=0), values.shape)
-    limit_s = _SHORT_APART_S if any(one.short for one in known) else _APART_S
-    for one, others, delays_s in zip(known, usual, values - usual, strict=True):
+    limit_s = _SHORT_APART_S if any(delay.short for delay in known) else _APART_S
+    for delay, others, delays_s in zip(known, usual, values - usual, strict=True):
         if np.abs(delays_s).min() <= limit_s or delays_s.prod() <= 0:
             continue
         yield finding(
             "T213",
-            Where(trial=one.name),
+            Where(trial=delay.name),
             delay_s=Quantity(float(delays_s.mean()), "s", limit=limit_s, usual=_APART_S.usual),
-            by_pelvis_s=Quantity(one.by_pelvis_s, "s"),
-            by_markers_s=Quantity(one.by_markers_s, "s"),
-            others_s=Quantity(tuple(float(each) for each in others), "s"),
+            by_pelvis_s=Quantity(delay.by_pelvis_s, "s"),
+            by_markers_s=Quantity(delay.by_markers_s, "s"),
+            others_s=Quantity(tuple(float(other) for other in others), "s"),
         )
 
 
@@ -134,24 +134,28 @@ def uneven_delays(delays: Sequence[TrialDelay | None]) -> Iterator[Finding]:
 def plate_delay(context: RecordingContext) -> Iterator[Finding]:
     """Report T216: each plate with a delay of its own explains the vertical velocity, and neither one for all nor gains
     do."""
-    plates, parts = context.plates, [one for one in context.velocities if span_s(one.time) >= _LEAST_PLATE_WINDOW_S]
+    plates, parts = (
+        context.plates,
+        [velocity for velocity in context.velocities if span_s(velocity.time) >= _LEAST_PLATE_WINDOW_S],
+    )
     if plates is None or not parts or not context.has_strides:
         return
     used = np.flatnonzero(plates.force[..., 1].max(axis=0) > FIRM_LOAD_N)
     if len(used) < 2:
         return
     time, vertical = plates.time, plates.force[:, used, 1]
-    off = joined_without_trend(parts, [(one.pelvis + one.centre)[:, 1] / 2 - one.by_forces[:, 1] for one in parts])
+    off = joined_without_trend(parts, [(part.pelvis + part.centre)[:, 1] / 2 - part.by_forces[:, 1] for part in parts])
     pushed = _accelerations(parts, time, vertical)
     by_forces = np.stack(
-        [joined_without_trend(parts, [one.by(time, own) for one in parts]) for own in vertical.T], axis=1
+        [joined_without_trend(parts, [part.by(time, plate_force) for part in parts]) for plate_force in vertical.T],
+        axis=1,
     )
-    delays_s, own = _fitted(pushed, off)
+    delays_s, separately = _fitted(pushed, off)
     _, together = _fitted(pushed.sum(axis=1, keepdims=True), off)
     _, gains = _fitted(by_forces, off)
     late, early = int(np.argmax(delays_s)), int(np.argmin(delays_s))
     difference_s = float(delays_s[late] - delays_s[early])
-    if difference_s <= _DIFFERENCE_S or own > _EXPLAINS * together or own > _CLEARLY_BEST * gains:
+    if difference_s <= _DIFFERENCE_S or separately > _EXPLAINS * together or separately > _CLEARLY_BEST * gains:
         return
     named, other = (plates.names[used[p]] for p in (late, early))
     if {named, other} & context.plates_reached_beyond:
@@ -167,7 +171,7 @@ def plate_delay(context: RecordingContext) -> Iterator[Finding]:
             "plate": Quantity(named),
             "difference_s": Quantity(difference_s, "s", limit=_DIFFERENCE_S, usual=_DIFFERENCE_S.usual),
             "other": Quantity(other),
-            "velocity_residual_m_s": Quantity((together, own), "m/s", limit=_EXPLAINS * together),
+            "velocity_residual_m_s": Quantity((together, separately), "m/s", limit=_EXPLAINS * together),
         },
     )
 
@@ -176,8 +180,8 @@ def _accelerations(parts: Sequence[ForceVelocity], time: FloatArray, force: Floa
     """Return accelerations (n, p) m/s2 of the body by forces (k, p) N over (k,) s, in all windows."""
     return np.stack(
         [
-            joined_without_trend(parts, [np.interp(part.time, time, own) / part.mass_kg for part in parts])
-            for own in force.T
+            joined_without_trend(parts, [np.interp(part.time, time, component) / part.mass_kg for part in parts])
+            for component in force.T
         ],
         axis=1,
     )
@@ -248,13 +252,16 @@ def _growing_delays(context: RecordingContext) -> Iterator[Finding]:
         if span_s(part.time) < _LEAST_RATE_WINDOW_S:
             continue
         found = vertical_match_of(part, growing=True)
-        if not found or max(one.residual for one in found) > LARGEST_RESIDUAL:
+        if not found or max(match.residual for match in found) > LARGEST_RESIDUAL:
             continue
         # with another gain under one foot the body seems to be pushed ever earlier, or later, within two steps
-        gains = vertical_match_of(part, own=part.by(trial.loads.time, trial.loads.force[:, 0, 1]))
-        if any(one.residual > other.residual for one, other in zip(found, gains, strict=False)):
+        gains = vertical_match_of(part, plate_velocity=part.by(trial.loads.time, trial.loads.force[:, 0, 1]))
+        if any(match.residual > other.residual for match, other in zip(found, gains, strict=False)):
             continue
-        delay, rate_error = np.array([one.delay_s for one in found]), np.array([one.rate_error for one in found])
+        delay, rate_error = (
+            np.array([match.delay_s for match in found]),
+            np.array([match.rate_error for match in found]),
+        )
         if np.abs(rate_error).min() < _LEAST_GROWTH or abs(np.sign(rate_error).sum()) < len(rate_error):
             continue
         mean = float(rate_error.mean())
@@ -278,7 +285,7 @@ def file_events(context: RecordingContext) -> Iterator[Finding]:
     trial = context.loaded
     if not isinstance(trial, Trial):
         return
-    count = sum(one.of_gait is not None for one in trial.events)
+    count = sum(event.of_gait is not None for event in trial.events)
     if counted_from_first_frame(trial):
         first = Quantity(float(trial.markers.time[0]), "s")
         yield finding("T314", context.at(), events=Quantity(count, "1"), first_s=first)
@@ -287,14 +294,14 @@ def file_events(context: RecordingContext) -> Iterator[Finding]:
         yield finding("T312", context.at(), events=Quantity(count, "1"))
         return
     other_foot = events_of_other_foot(trial.events, [*gait_events(trial), *_by_motion(context)])
-    for one in other_foot[:1]:
+    for event in other_foot[:1]:
         yield finding(
             "T313",
             context.at(),
-            event=Quantity(one.label),
-            foot=Quantity(FOOT_NAMES[FEET.index(one.side)]),
-            other_foot=Quantity(FOOT_NAMES[1 - FEET.index(one.side)]),
-            time_s=Quantity(one.time_s, "s"),
+            event=Quantity(event.label),
+            foot=Quantity(FOOT_NAMES[FEET.index(event.side)]),
+            other_foot=Quantity(FOOT_NAMES[1 - FEET.index(event.side)]),
+            time_s=Quantity(event.time_s, "s"),
             events=Quantity(len(other_foot), "1"),
         )
     apart = contradicted_events(trial)
@@ -335,7 +342,7 @@ def belt_speed(context: RecordingContext) -> Iterator[Finding]:
         return
     stated = [belt.under(foot).distance_m(*time[[0, -1]]) / float(np.ptp(time)) for foot in range(2)]
     pairs = list(zip(stated, speeds, strict=True))
-    excess = [abs(one - other) / max(_APART * max(one, other), LEAST_BELT_M_S) for one, other in pairs]
+    excess = [abs(speed - other) / max(_APART * max(speed, other), LEAST_BELT_M_S) for speed, other in pairs]
     worst = int(np.argmax(excess))
     if excess[worst] <= 1.0:
         return

@@ -31,14 +31,16 @@ def forces_of_steps(context: RecordingContext) -> Iterator[Finding]:
         return
     # from Z to X is a positive rotation about Y
     undone = {0.0: force, np.pi: -force, np.pi / 2: -1j * force, -np.pi / 2: 1j * force}
-    fits = {angle: float(np.vdot(to_body, one).real) / size for angle, one in undone.items()}
+    fits = {angle: float(np.vdot(to_body, force_turned).real) / size for angle, force_turned in undone.items()}
     cosines, away = {}, []
     for axis, way, along in ((0, to_body.imag, force.imag), (2, to_body.real, force.real)):
         cosines[axis] = float(way @ along / max(np.linalg.norm(way) * np.linalg.norm(along), 1e-12))
         if rms(way) > _LEAST_WAY and cosines[axis] < AWAY:
             away.append(axis)
     angle = max(fits, key=fits.__getitem__)
-    one_sign = [float(np.vdot(to_body, one).real) / size for one in (force.conjugate(), -force.conjugate())]
+    one_sign = [
+        float(np.vdot(to_body, force_signed).real) / size for force_signed in (force.conjugate(), -force.conjugate())
+    ]
     if angle and fits[angle] > max(_POINTING, *one_sign):
         yield finding(
             "P231",
@@ -62,7 +64,7 @@ def _ways_to_body(context: RecordingContext) -> tuple[np.ndarray, np.ndarray]:
     the vertical one, along Z and, imaginary, along X, while single feet load plates."""
     plates, markers = context.plates, context.all_markers
     centre = body_centre(context.segment_of_label, markers)
-    steps = [one for one in context.contacts if not one.between]
+    steps = [contact for contact in context.contacts if not contact.between]
     seen = np.zeros(0, dtype=bool) if centre is None else np.isfinite(centre).all(axis=1)
     if plates is None or centre is None or seen.sum() < 2 or not steps:
         return np.zeros(0, dtype=complex), np.zeros(0, dtype=complex)

@@ -57,7 +57,7 @@ def free_moments(context: RecordingContext) -> Iterator[Finding]:
         return
     columns = [*_columns(context, plates)]
     yield from columns
-    yield from _about_fixed_point(context, plates, [one.where.plate for one in columns])
+    yield from _about_fixed_point(context, plates, [column.where.plate for column in columns])
     yield from _exchanged(context, plates)
     for name, wrench in carrying(plates, context.adult_share):
         peak = float(np.abs(free_moment(wrench)).max())
@@ -68,18 +68,20 @@ def free_moments(context: RecordingContext) -> Iterator[Finding]:
 
 def _columns(context: RecordingContext, plates: PlateLoads) -> Iterator[Finding]:
     """Report P261 and P262: moment columns that are not the free moments at their centres of pressure."""
-    for name, one in zip(plates.names, plates.torques or (), strict=plates.torques is not None):
-        x, _, z = one.rms_nm
+    for name, torque in zip(plates.names, plates.torques or (), strict=plates.torques is not None):
+        x, _, z = torque.rms_nm
         across = float(np.hypot(x, z))
-        if _is_rotated(one, across):
+        if _is_rotated(torque, across):
             yield finding(
-                "P262", context.at(plate=name, **context.along(2 if z > x else 0)), rms_nm=Quantity(one.rms_nm, "N m")
+                "P262",
+                context.at(plate=name, **context.along(2 if z > x else 0)),
+                rms_nm=Quantity(torque.rms_nm, "N m"),
             )
-        elif one.lever_arm_m > _COLUMNS_ARM_M:
+        elif torque.lever_arm_m > _COLUMNS_ARM_M:
             yield finding(
                 "P261",
                 context.at(plate=name),
-                lever_arm_m=Quantity(one.lever_arm_m, "m", limit=_COLUMNS_ARM_M, usual=_COLUMNS_ARM_M.usual),
+                lever_arm_m=Quantity(torque.lever_arm_m, "m", limit=_COLUMNS_ARM_M, usual=_COLUMNS_ARM_M.usual),
                 horizontal_rms_nm=Quantity(across, "N m"),
                 method=Quantity("columns"),
             )
@@ -136,13 +138,13 @@ def _fixed_point(wrench: FloatArray, torque: FloatArray) -> tuple[FloatArray, Fl
 def _exchanged(context: RecordingContext, plates: PlateLoads) -> Iterator[Finding]:
     """Report P263: moment columns of two plates interchanged, by the residuals of each plate while it is loaded."""
     torques = plates.torques or ()
-    for a, one in enumerate(torques):
-        b = one.belongs_to
+    for a, torque in enumerate(torques):
+        b = torque.belongs_to
         if b is not None and a < b:
             yield finding(
                 "P263",
                 context.at(),
-                own_rms_nm=Quantity(tuple(each.rms_nm[1] for each in (one, torques[b])), "N m"),
+                own_rms_nm=Quantity(tuple(exchanged.rms_nm[1] for exchanged in (torque, torques[b])), "N m"),
                 plate=Quantity(plates.names[a]),
                 other=Quantity(plates.names[b]),
             )

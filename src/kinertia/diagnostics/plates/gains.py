@@ -86,21 +86,21 @@ def _by_vertical_velocity(context: RecordingContext, plates: PlateLoads) -> Find
         if span_s(part.time) < _LEAST_WINDOW_S:
             continue
         read, rate = vertical_match_of(part), vertical_match_of(part, growing=True)
-        own = [part.by(plates.time, vertical) for vertical in plates.force[..., 1].T]
-        used = [p for p, by_forces in enumerate(own) if np.ptp(by_forces) > 0.0]
-        by_plate = {p: found for p in used if (found := vertical_match_of(part, own[p]))}
+        velocities = [part.by(plates.time, vertical) for vertical in plates.force[..., 1].T]
+        used = [p for p, by_forces in enumerate(velocities) if np.ptp(by_forces) > 0.0]
+        by_plate = {p: found for p in used if (found := vertical_match_of(part, velocities[p]))}
         if not read or len(by_plate) < 2:
             continue
-        best = min(by_plate, key=lambda p: sum(each.residual for each in by_plate[p]))
-        gain, residual = np.array([(each.gain, each.residual) for each in by_plate[best]]).T
+        best = min(by_plate, key=lambda p: sum(match.residual for match in by_plate[p]))
+        gain, residual = np.array([(match.gain, match.residual) for match in by_plate[best]]).T
         rivals = (
-            np.array([_RESIDUAL_SHARE * each.residual for each in read]),
+            np.array([_RESIDUAL_SHARE * match.residual for match in read]),
             np.array([e.residual for e in rate or read]),
         )
         if abs(np.sign(gain).sum()) < len(gain) or np.abs(gain).min() < _LEAST_GAIN or (residual > rivals).any():
             continue
         # this plate should read more by this factor: by it alone the body weighs less by the same
-        share = float(own[best][-1] / sum(each[-1] for each in own))
+        share = float(velocities[best][-1] / sum(velocity[-1] for velocity in velocities))
         own_kg = part.mass_kg / (share + (1.0 - share) * (1.0 + float(gain.mean())))
         others = " and ".join(plates.names[p] for p in used if p != best)
         weights = [(own_kg, plates.names[best]), (own_kg * (1.0 + float(gain.mean())), others)]
@@ -110,7 +110,7 @@ def _by_vertical_velocity(context: RecordingContext, plates: PlateLoads) -> Find
             (heavy, light),
             (heavy_kg, light_kg),
             gain=Quantity(heavy_kg / light_kg - 1.0, "1", limit=_LEAST_GAIN, usual=_LEAST_GAIN.usual),
-            residual_share=Quantity((float(np.mean([each.residual for each in read])), float(residual.mean())), "1"),
+            residual_share=Quantity((float(np.mean([match.residual for match in read])), float(residual.mean())), "1"),
             method=Quantity("vertical velocity"),
         )
     return None
@@ -133,7 +133,7 @@ def _scaled_axis(
     residual = VelocityResidual.of(plates.time, plates.force, long, axis)
     steady = steady_scaled(plates.time, plates.force, long, axis)
     for as_read, scaled in ((residual.as_read, residual.scaled), steady):
-        best = min(scaled, key=lambda one: one.residual)
+        best = min(scaled, key=lambda scaling: scaling.residual)
         zeroed = min(float(residual.plate_zeroed.min()), residual.all_zeroed)
         limit = min(_SCALED * as_read, CLEARLY_BEST * zeroed)
         explains = as_read >= _LEAST_RESIDUAL_M_S and best.residual <= limit and _is_gain(best)
@@ -147,11 +147,11 @@ def _more_alike(context: RecordingContext, plates: PlateLoads, axis: int, best: 
     braking and pushing off differ less from foot to foot than gains that are found here. True where only it has steps.
     """
     ranges: dict[int, list[float]] = {}
-    for one in context.whole_contacts:
-        if one.is_step:
-            own = plates.force[within(plates.time, one.start_s, one.end_s), one.plate, axis]
-            ranges.setdefault(one.plate, []).append(float(np.ptp(own)))
-    usual = [float(np.mean(each)) for plate, each in ranges.items() if plate != best.plate]
+    for contact in context.whole_contacts:
+        if contact.is_step:
+            pushed = plates.force[within(plates.time, contact.start_s, contact.end_s), contact.plate, axis]
+            ranges.setdefault(contact.plate, []).append(float(np.ptp(pushed)))
+    usual = [float(np.mean(ranges_n)) for plate, ranges_n in ranges.items() if plate != best.plate]
     if best.plate not in ranges or not usual:
         return True
     larger = float(np.log(np.mean(ranges[best.plate]) / np.mean(usual)))
@@ -166,8 +166,8 @@ def _multiple(
     scaled: Sequence[Scaled],
     residuals: Quantity,
 ) -> Finding:
-    alike = [one for one in scaled if CLEARLY_BEST * one.residual < best.residual and _is_gain(one)]
-    names = ["all plates" if one.plate is None else plates.names[one.plate] for one in alike]
+    alike = [scaling for scaling in scaled if CLEARLY_BEST * scaling.residual < best.residual and _is_gain(scaling)]
+    names = ["all plates" if scaling.plate is None else plates.names[scaling.plate] for scaling in alike]
     evidence = {"factor": Quantity(best.factor, "1"), "velocity_residual_m_s": residuals}
     single = len(alike) == 1 and best.plate is not None
     if not single:
@@ -175,5 +175,5 @@ def _multiple(
     return with_evidence("P222", context.at(plate=names[0] if single else None, **context.along(axis)), evidence)
 
 
-def _is_gain(one: Scaled) -> bool:
-    return any(low <= one.factor <= high for low, high in _FACTORS)
+def _is_gain(scaling: Scaled) -> bool:
+    return any(low <= scaling.factor <= high for low, high in _FACTORS)

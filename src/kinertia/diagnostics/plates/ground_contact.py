@@ -121,9 +121,9 @@ def both_feet(context: RecordingContext) -> Iterator[Finding]:
     plates = context.plates
     if plates is None or context.is_static:
         return
-    for one in filter(lambda each: context.uses(each.span_s), context.shared_loads):
-        where = context.at(plate=plates.names[one.contact.plate], span_s=one.span_s)
-        yield finding("P276", where, share=Quantity(one.share, "1", limit=one.limit))
+    for load in filter(lambda shared: context.uses(shared.span_s), context.shared_loads):
+        where = context.at(plate=plates.names[load.contact.plate], span_s=load.span_s)
+        yield finding("P276", where, share=Quantity(load.share, "1", limit=load.limit))
 
 
 @check("P282", unless=NEEDS_LOADS_UNDER_FEET, overhang=OVERHANG_M, hallux=HALLUX_M, edge=NO_FOOT_M)
@@ -132,12 +132,12 @@ def plate_edges(context: RecordingContext) -> Iterator[Finding]:
     plates = context.plates
     if plates is None or context.is_static:
         return
-    for one in filter(lambda each: context.uses(each.span_s), context.overhangs):
+    for overhang in filter(lambda reach: context.uses(reach.span_s), context.overhangs):
         yield finding(
             "P282",
-            context.at(plate=plates.names[one.plate], span_s=one.span_s),
-            overhang_m=Quantity(one.overhang_m, "m", limit=OVERHANG_M),
-            foot=Quantity(FOOT_NAMES[one.foot]),
+            context.at(plate=plates.names[overhang.plate], span_s=overhang.span_s),
+            overhang_m=Quantity(overhang.overhang_m, "m", limit=OVERHANG_M),
+            foot=Quantity(FOOT_NAMES[overhang.foot]),
         )
 
 
@@ -148,7 +148,7 @@ def foreign_load(context: RecordingContext) -> Iterator[Finding]:
     if found is None:
         return
     names = () if context.plates is None else context.plates.names
-    plates = {names[one.plate] for one in context.foreign_contacts}
+    plates = {names[foreign.plate] for foreign in context.foreign_contacts}
     left = context.trial_on_plates is not None and bool(plates)
     where = context.at(plate=plates.pop() if plates else None, span_s=found.span_s)
     surplus = Quantity(found.surplus, "1", limit=FOREIGN_SHARE)
@@ -159,9 +159,9 @@ def foreign_load(context: RecordingContext) -> Iterator[Finding]:
 def stray_loads(context: RecordingContext) -> Iterator[Finding]:
     """Report P285: loads that are under no foot and were left out."""
     names = () if context.plates is None else context.plates.names
-    for one in context.stray_contacts:
-        where = context.at(plate=names[one.plate], span_s=(float(one.time[0]), float(one.time[-1])))
-        yield finding("P285", where, distance_m=Quantity(one.distance_m, "m", limit=STRAY_M, usual=STRAY_M.usual))
+    for stray in context.stray_contacts:
+        where = context.at(plate=names[stray.plate], span_s=(float(stray.time[0]), float(stray.time[-1])))
+        yield finding("P285", where, distance_m=Quantity(stray.distance_m, "m", limit=STRAY_M, usual=STRAY_M.usual))
 
 
 def coverage_of(context: RecordingContext) -> tuple[LegCoverage, ...]:
@@ -179,10 +179,10 @@ def stance_coverage(context: PersonContext) -> Iterator[Finding]:
     Not where the user states the window of every trial.
     """
     by_task: dict[Task, list[RecordingContext]] = {}
-    for one in context.trials:
-        by_task.setdefault(task_of(one), []).append(one)
+    for trial in context.trials:
+        by_task.setdefault(task_of(trial), []).append(trial)
     for task, trials in by_task.items():
-        if all(one.window_s is not None for one in trials):
+        if all(trial.window_s is not None for trial in trials):
             continue
         for leg in joined_coverage(map(coverage_of, trials)):
             if leg.missing:

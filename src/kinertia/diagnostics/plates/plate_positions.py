@@ -79,28 +79,28 @@ def rotated_plates(context: RecordingContext) -> Iterator[Hypothesis]:
     where none does, or also one of other plates. Other operations on the same plates that do are among its causes.
     """
     plates, feet = context.plates, context.foot_trajectories
-    steps = [one for one in context.contacts if one.is_step]
+    steps = [contact for contact in context.contacts if contact.is_step]
     if plates is None or feet is None or plates.corners is None or not steps or not context.has_strides:
         return
-    read_m = _distances(steps, [one.place for one in steps], feet)
+    read_m = _distances(steps, [step.place for step in steps], feet)
     if read_m.max() < WRONG_M:
         return
     middle = plates.corners.mean(axis=1)[:, [0, 2]]
-    used = sorted({one.plate for one in steps})
-    offset = np.mean([one.own_offset_m for one in steps], axis=0)
-    left_m: dict[tuple[int, ...], FloatArray] = {(): _distances(steps, [one.place - offset for one in steps], feet)}
+    used = sorted({step.plate for step in steps})
+    offset = np.mean([step.own_offset_m for step in steps], axis=0)
+    left_m: dict[tuple[int, ...], FloatArray] = {(): _distances(steps, [step.place - offset for step in steps], feet)}
     for k, (_, matrix, _) in enumerate(_OPERATIONS):
-        turned_m = _distances(steps, [_turned(one.place, middle[one.plate], matrix) for one in steps], feet)
+        turned_m = _distances(steps, [_turned(step.place, middle[step.plate], matrix) for step in steps], feet)
         for which in {*((p,) for p in used), tuple(used)}:
-            left_m[(k, *which)] = np.where([one.plate in which for one in steps], turned_m, read_m)
-    best, *others = sorted(left_m, key=lambda one: rms(left_m[one]))
-    rivals = [one for one in others if one[1:] != best[1:]]
-    only = not any(left_m[one].max() <= _RIGHT_M for one in rivals)
+            left_m[(k, *which)] = np.where([step.plate in which for step in steps], turned_m, read_m)
+    best, *others = sorted(left_m, key=lambda candidate: rms(left_m[candidate]))
+    rivals = [candidate for candidate in others if candidate[1:] != best[1:]]
+    only = not any(left_m[candidate].max() <= _RIGHT_M for candidate in rivals)
     clearly = only or rms(left_m[best]) < _CLEARLY_BEST * rms(left_m[rivals[0]])
     if not best or left_m[best].max() > _RIGHT_M or not clearly:
         return
     # of a step along the middle of its plate, a half turn is hardly another operation than mirroring along the walk
-    alike = [one for one in others if one[1:] == best[1:] and left_m[one].max() <= _RIGHT_M]
+    alike = [candidate for candidate in others if candidate[1:] == best[1:] and left_m[candidate].max() <= _RIGHT_M]
     wrong = list(best[1:])
     operation, matrix, cause = _OPERATIONS[best[0]]
     if operation == _HALF_TURN and min(push_share(plates, p, context.travel) or 0.0 for p in wrong) > LEAST_PUSH:
@@ -111,7 +111,7 @@ def rotated_plates(context: RecordingContext) -> Iterator[Hypothesis]:
     found = finding(
         "P242",
         context.at(plate=plates.names[wrong[0]] if len(wrong) == 1 else None),
-        causes=(cause, *(f"{name}: {other}" for name, _, other in (_OPERATIONS[one[0]] for one in alike))),
+        causes=(cause, *(f"{name}: {other}" for name, _, other in (_OPERATIONS[candidate[0]] for candidate in alike))),
         mend=Quantity(_MENDING[cause]),
         before_m=Quantity(float(read_m.max()), "m", limit=WRONG_M, usual=WRONG_M.usual),
         after_m=Quantity(float(left_m[best].max()), "m", limit=_RIGHT_M),
@@ -130,29 +130,29 @@ def _turned(place: FloatArray, middle: FloatArray, matrix: Sequence[Sequence[int
 def _distances(steps: Sequence[PlateContact], place: Sequence[FloatArray], feet: Feet) -> FloatArray:
     """Return the distance (m, RMS) of each step from where the load of the nearer foot is expected."""
     errors = []
-    for one, each in zip(steps, place, strict=True):
-        off = [np.square(each - foot.expected_cop(one.time, one.weight)).sum(axis=1) for foot in feet]
-        errors.append(min(float(np.sqrt(np.average(square, weights=one.weight))) for square in off))
+    for step, centres in zip(steps, place, strict=True):
+        off = [np.square(centres - foot.expected_cop(step.time, step.weight)).sum(axis=1) for foot in feet]
+        errors.append(min(float(np.sqrt(np.average(square, weights=step.weight))) for square in off))
     return np.array(errors)
 
 
 def interchanged_plates(context: RecordingContext) -> Iterator[Hypothesis]:
     """Report P241: loads that are under no foot at their own position, but under one at another plate's."""
     plates, feet, contacts = context.plates, context.foot_trajectories, context.contacts
-    if plates is None or feet is None or len({one.plate for one in contacts}) < 2:
+    if plates is None or feet is None or len({contact.plate for contact in contacts}) < 2:
         return
-    before = max(one.distance_m for one in contacts)
+    before = max(contact.distance_m for contact in contacts)
     if before <= FAR_M:
         return
-    used = sorted({one.plate for one in contacts})
+    used = sorted({contact.plate for contact in contacts})
     middle = _middles(plates, used)
     tried = []
     for pair in combinations(used, 2):
         by = np.zeros((len(plates.names), 2))
         by[pair[0]], by[pair[1]] = middle[pair[1]] - middle[pair[0]], middle[pair[0]] - middle[pair[1]]
         moved = displaced(plates, by)
-        tried.append((max(one.distance_m for one in contacts_of(moved, feet)), pair, moved))
-    after, pair, moved = min(tried, key=lambda one: one[0])
+        tried.append((max(contact.distance_m for contact in contacts_of(moved, feet)), pair, moved))
+    after, pair, moved = min(tried, key=lambda candidate: candidate[0])
     if after > min(FAR_M / 2, before):
         yield from _opposite(context, plates, feet)
         return
@@ -185,22 +185,26 @@ def _middles(plates: PlateLoads, used: Sequence[int]) -> dict[int, FloatArray]:
 
 def _opposite(context: RecordingContext, plates: PlateLoads, feet: Feet) -> Iterator[Hypothesis]:
     """Yield loads of two plates, or belts, displaced equally in opposite directions, each by a constant amount."""
-    steps = [one for one in context.contacts if one.is_step]
-    used = sorted({one.plate for one in steps})
+    steps = [contact for contact in context.contacts if contact.is_step]
+    used = sorted({step.plate for step in steps})
     if len(used) != 2:
         return
     offsets: dict[int, list[FloatArray]] = {p: [] for p in used}
-    for one in steps:
-        from_feet = [one.place - foot.expected_cop(one.time, one.weight) for foot in feet]
-        mean = [np.average(each, axis=0, weights=one.weight) for each in from_feet]
+    for step in steps:
+        from_feet = [step.place - foot.expected_cop(step.time, step.weight) for foot in feet]
+        mean = [np.average(offset, axis=0, weights=step.weight) for offset in from_feet]
         # the swinging foot moves away
-        foot = int(np.argmin([np.square(each - m).sum(axis=1).mean() for each, m in zip(from_feet, mean, strict=True)]))
-        offsets[one.plate].append(mean[foot])
+        foot = int(
+            np.argmin([np.square(offset - m).sum(axis=1).mean() for offset, m in zip(from_feet, mean, strict=True)])
+        )
+        offsets[step.plate].append(mean[foot])
     first, second = (np.mean(offsets[p], axis=0) for p in used)
     half = (first - second) / 2
     size = float(np.linalg.norm(half))
     residual = max(
-        float(np.linalg.norm(each - sign * half)) for p, sign in zip(used, (1, -1), strict=True) for each in offsets[p]
+        float(np.linalg.norm(offset - sign * half))
+        for p, sign in zip(used, (1, -1), strict=True)
+        for offset in offsets[p]
     )
     if size < FAR_M or residual > min(FAR_M / 2, _DIFFERENCE * size):
         return
@@ -220,19 +224,19 @@ def repeated_plates(context: RecordingContext) -> Iterator[Finding]:
     for p in used:
         others = [other for other in used if other != p and p not in repeated.get(other, ((),))[0]]
         single = [(other,) for other in others if other < p and other not in repeated]
-        for parts in (*single, *combinations([one for one in others if one not in repeated], 2)):
+        for parts in (*single, *combinations([plate for plate in others if plate not in repeated], 2)):
             difference = _difference(plates, p, parts)
             if difference < _EQUAL or _at_the_same_place(plates, p, parts):
                 repeated[p] = parts, difference
                 break
-    own = ", ".join(f'"{plates.names[p]}"' for p in used if p not in repeated)
+    unrepeated = ", ".join(f'"{plates.names[p]}"' for p in used if p not in repeated)
     for p, (parts, difference) in repeated.items():
         yield finding(
             "P287",
             context.at(plate=plates.names[p]),
             difference=Quantity(difference, "1", limit=_EQUAL),
             others=Quantity(" and ".join(plates.names[part] for part in parts)),
-            names=Quantity(own),
+            names=Quantity(unrepeated),
         )
 
 
@@ -245,7 +249,7 @@ def _difference(plates: PlateLoads, p: int, parts: tuple[int, ...]) -> float:
     if any((plates.force[loaded, part, 1] > _LOADED_N).sum() < _FEWEST for part in parts):
         return np.inf
     off, varying = force[loaded] - total[loaded], force[loaded] - force[loaded].mean(axis=0)
-    rms, variation = (float(np.sqrt(np.square(each).sum(axis=1).mean())) for each in (off, varying))
+    rms, variation = (float(np.sqrt(np.square(offset).sum(axis=1).mean())) for offset in (off, varying))
     return rms / float(force[:, 1].max()) if rms < _OF_VARIATION * variation else np.inf
 
 
@@ -254,11 +258,11 @@ def _at_the_same_place(plates: PlateLoads, p: int, parts: tuple[int, ...]) -> bo
     if len(parts) != 1 or plates.corners is None:
         return False
     (other,) = parts
-    one, two = (plates.force[:, each, 1] for each in (p, other))
-    loaded = (one > _LOADED_N) | (two > _LOADED_N)
+    first, two = (plates.force[:, plate, 1] for plate in (p, other))
+    loaded = (first > _LOADED_N) | (two > _LOADED_N)
     middles: FloatArray = plates.corners[[p, other]].mean(axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
-        alike = np.corrcoef(one[loaded], two[loaded])[0, 1] > _PROPORTIONAL
+        alike = np.corrcoef(first[loaded], two[loaded])[0, 1] > _PROPORTIONAL
     return bool(alike and np.linalg.norm(middles[0] - middles[1]) < _SAME_PLACE_M)
 
 
@@ -285,7 +289,9 @@ def heights_on_plates(trial: RecordingContext) -> dict[str, tuple[float, float]]
         height_m = _lowest_m(trial, contact)
         if height_m is not None:
             lowest[contact.plate] = max(height_m, lowest.get(contact.plate, -np.inf))
-    return {} if plates is None else {plates.names[p]: (own, _surface_m(plates, p)) for p, own in lowest.items()}
+    return (
+        {} if plates is None else {plates.names[p]: (lowest_m, _surface_m(plates, p)) for p, lowest_m in lowest.items()}
+    )
 
 
 def _surface_m(plates: PlateLoads, plate: int) -> float:

@@ -128,11 +128,11 @@ def _dropped_samples(context: RecordingContext, plates: PlateLoads) -> Iterator[
     vertical, silent = plates.force[..., 1], np.equal(np.abs(plates.force).sum(axis=2), 0.0)
     of_all = list(_dropped(context.at(), plates.time, vertical.sum(axis=1), np.asarray(silent.all(axis=1))))
     yield from of_all
-    known = {one.where.span_s for one in of_all}
+    known = {dropped.where.span_s for dropped in of_all}
     for p, name in enumerate(plates.names):
-        for one in _dropped(context.at(plate=name), plates.time, vertical[:, p], silent[:, p], _DROPPED_S):
-            if one.where.span_s not in known:
-                yield one
+        for dropped in _dropped(context.at(plate=name), plates.time, vertical[:, p], silent[:, p], _DROPPED_S):
+            if dropped.where.span_s not in known:
+                yield dropped
 
 
 def _dropped(
@@ -202,7 +202,7 @@ def spikes(context: RecordingContext) -> Iterator[Finding]:
         return
     for name, bridged in zip(plates.names, plates.spikes, strict=True):
         if bridged:
-            largest = max(bridged, key=lambda one: abs(one.size_n))
+            largest = max(bridged, key=lambda spike: abs(spike.size_n))
             yield finding(
                 "P109",
                 context.at(plate=name, span_s=(largest.time_s, largest.time_s), **context.along(largest.axis)),
@@ -256,7 +256,7 @@ def low_passed(context: RecordingContext) -> Iterator[Finding]:
     plates = context.plates
     if plates is None:
         return
-    overshoot_s = max((one.overshoot_s for one in plates.unloaded or ()), default=0.0)
+    overshoot_s = max((reading.overshoot_s for reading in plates.unloaded or ()), default=0.0)
     bandwidth_hz = load_bandwidth_hz(plates.time, plates.force[..., 1])
     cutoffs_hz = [] if bandwidth_hz is None else [bandwidth_hz]
     cutoffs_hz += [_OVERSHOOT_HZ_S / overshoot_s] if overshoot_s > _OVERSHOOT_S else []
@@ -314,7 +314,7 @@ def _longest_load(plates: PlateLoads, p: int) -> slice | None:
     loads = runs(plates.force[:, p, 1] > FIRM_LOAD_N)
     if not loads or rate_hz < _SAMPLES_PER_PERIOD * max(_MAINS_HZ):
         return None
-    first, last = max(loads, key=lambda one: one[1] - one[0])
+    first, last = max(loads, key=lambda span: span[1] - span[0])
     return slice(first, last + 1) if (last - first) / rate_hz >= _SHORTEST_S else None
 
 

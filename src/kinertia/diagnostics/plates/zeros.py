@@ -143,7 +143,7 @@ def zeros_under_load(context: RecordingContext) -> Iterator[Finding]:
     for axis in HORIZONTAL:
         unexplained = _unexplained(context, plates, parts, axis)
         zero = _plate_zero(context, plates, parts, axis, unexplained is not None)
-        yield from (one for one in (zero, unexplained) if one is not None)
+        yield from (reported for reported in (zero, unexplained) if reported is not None)
 
 
 def _unexplained(
@@ -210,7 +210,7 @@ def _plate_zero(
     if residual.as_read < _LEAST_RESIDUAL_M_S or zeroed > limit_m_s:
         return None
     limit_n = _PLATE_ZERO_N * max(1.0, _WINDOW_S / max(span_s(part.time) for part in long))
-    if abs(zero_offset_n) < limit_n or min(one.residual for one in residual.scaled) < CLEARLY_BEST * zeroed:
+    if abs(zero_offset_n) < limit_n or min(scaling.residual for scaling in residual.scaled) < CLEARLY_BEST * zeroed:
         return None
     names = [plates.names[p] for p in np.flatnonzero(residual.plate_zeroed * CLEARLY_BEST < zeroed)]
     if all_plates and not (len(names) == 1 and zeroed < CLEARLY_BEST * residual.without_trend):

@@ -58,8 +58,11 @@ class ResultContext:
             return Where(trial=trial, plate=plate)
         known = [axes for name, axes in self._axes.items() if trial in (None, name)]
         named = [axes.named(_GROUND_AXES[axis]) for axes in known]
-        directions, columns = {one["axis"] for one in named}, {one["file_axis"] for one in named}
-        direction, column = (each.pop() if len(each) == 1 else None for each in (directions, columns))
+        directions, columns = (
+            {axis_names["axis"] for axis_names in named},
+            {axis_names["file_axis"] for axis_names in named},
+        )
+        direction, column = (distinct.pop() if len(distinct) == 1 else None for distinct in (directions, columns))
         return Where(trial=trial, plate=plate, axis=direction, file_axis=column)
 
 

@@ -31,31 +31,33 @@ def corrected(
     context: ResultContext, code: str, headline: str, errors: Iterable[CalibrationEntry], largest: float = np.inf
 ) -> list[Finding]:
     """List a finding for each of these errors that was found; arguments as in `correction`."""
-    return [correction(code, headline, context.at(one), one, largest) for one in errors if one.found]
+    return [correction(code, headline, context.at(error), error, largest) for error in errors if error.found]
 
 
-def correction(code: str, headline: str, where: Where, one: CalibrationEntry, largest: float = np.inf) -> Finding:
+def correction(code: str, headline: str, where: Where, error: CalibrationEntry, largest: float = np.inf) -> Finding:
     """Return an error's finding; `headline` names its main quantity. An error above `largest` is a WARNING."""
-    unsure = not one.supported
+    unsure = not error.supported
     evidence = {
-        headline: Quantity(one.value, one.unit, NOTABLE * one.prior_sd, (-one.prior_sd, one.prior_sd), one.sd),
-        "moved": Quantity(one.moved or 0.0, "1", limit=1.0),
+        headline: Quantity(
+            error.value, error.unit, NOTABLE * error.prior_sd, (-error.prior_sd, error.prior_sd), error.sd
+        ),
+        "moved": Quantity(error.moved or 0.0, "1", limit=1.0),
         "kind": Quantity("an apparent" if unsure else "a clear"),
         "condition": Quantity(" if other people's trials also show it" if unsure else ""),
     }
-    since = f", since {one.contradicted_by} contradicts it" if one.contradicted_by else ""
+    since = f", since {error.contradicted_by} contradicts it" if error.contradicted_by else ""
     causes = (f"soft tissue or the model{since}", "the instrument") if unsure else ("the instrument",)
-    return with_evidence(code, where, evidence, Severity.WARNING if abs(one.value) > largest else None, causes)
+    return with_evidence(code, where, evidence, Severity.WARNING if abs(error.value) > largest else None, causes)
 
 
 def equal(errors: Sequence[CalibrationEntry], usual_sd: float = np.inf) -> bool:
     """Return whether errors of the same quantity of several plates have all been found, and differ no more than errors
     of single plates do: by their prior SD, or this one if it is smaller.
     """
-    if len(errors) < _FEWEST or not all(one.found for one in errors):
+    if len(errors) < _FEWEST or not all(error.found for error in errors):
         return False
-    values = [one.value for one in errors]
-    usual = NOTABLE * np.sqrt(2) * min(usual_sd, *(one.prior_sd for one in errors))
+    values = [error.value for error in errors]
+    usual = NOTABLE * np.sqrt(2) * min(usual_sd, *(error.prior_sd for error in errors))
     return min(values) * max(values) > 0.0 and max(values) - min(values) <= usual
 
 
@@ -65,56 +67,58 @@ def delays(context: ResultContext) -> Iterator[Finding]:
 
     A delay within its prior is reported, too, if joint moments would leave their error bars without its correction.
     """
-    common = [one for one in context.errors if one.quantity == DELAY and one.trial is None]
-    own = [one for one in context.errors if one.quantity == DELAY and one.trial is not None]
-    if own and len(context.fit.trials) == 1:
-        common, own = own, []
-    for code, errors in (("T214", common), ("T215", own)):
+    common = [error for error in context.errors if error.quantity == DELAY and error.trial is None]
+    of_trials = [error for error in context.errors if error.quantity == DELAY and error.trial is not None]
+    if of_trials and len(context.fit.trials) == 1:
+        common, of_trials = of_trials, []
+    for code, errors in (("T214", common), ("T215", of_trials)):
         yield from (
-            correction(code, "delay_s", context.at(one), one) for one in errors if one.found or one.moves_moments
+            correction(code, "delay_s", context.at(error), error)
+            for error in errors
+            if error.found or error.moves_moments
         )
 
 
 @check("P214", "P215", zero=reported(ZERO_PRIOR_N.sd, "N"))
 def zero_offsets(context: ResultContext) -> Iterator[Finding]:
     """Report zero offsets that were corrected, and those that all plates of a trial share: an unmeasured force."""
-    zeros = [one for one in context.errors if one.quantity == ZERO]
+    zeros = [error for error in context.errors if error.quantity == ZERO]
     yield from corrected(context, "P215", "zero_offset_n", zeros)
-    for trial, axis in dict.fromkeys((one.trial, one.axis) for one in zeros):
-        own = [one for one in zeros if (one.trial, one.axis) == (trial, axis)]
-        if equal(own):
-            read_n = tuple(one.value for one in own)
+    for trial, axis in dict.fromkeys((zero.trial, zero.axis) for zero in zeros):
+        of_axis = [zero for zero in zeros if (zero.trial, zero.axis) == (trial, axis)]
+        if equal(of_axis):
+            read_n = tuple(zero.value for zero in of_axis)
             yield finding(
                 "P214",
                 context.along(axis, trial),
-                force_n=Quantity(float(np.mean(read_n)), "N", sd=max(one.sd for one in own)),
+                force_n=Quantity(float(np.mean(read_n)), "N", sd=max(zero.sd for zero in of_axis)),
                 tilt_rad=Quantity(
                     float(np.arctan(np.sum(read_n) / (GRAVITY_M_S2 * context.ready.total_mass.total_kg))), "rad"
                 ),
-                zero_offset_n=Quantity(read_n, "N", limit=2.0 * own[0].prior_sd),
+                zero_offset_n=Quantity(read_n, "N", limit=2.0 * of_axis[0].prior_sd),
             )
 
 
 def session_contradictions(
-    person: str, own: Sequence[CalibrationEntry], others: Sequence[CalibrationEntry]
+    person: str, of_person: Sequence[CalibrationEntry], others: Sequence[CalibrationEntry]
 ) -> Iterator[Finding]:
     """Report S501: instrument errors that differ between one person's trials and the others' in a session.
 
     Args:
         person: name of the person.
-        own, others: errors of instruments by their trials.
+        of_person, others: errors of instruments by their trials.
     """
-    by_others = {one.key: one for one in others}
-    for one in own:
-        other = by_others.get(one.key, one)
-        apart_sd = float(np.hypot(one.sd, other.sd))
-        if abs(one.value - other.value) > APART_SD * apart_sd:
+    by_others = {entry.key: entry for entry in others}
+    for error in of_person:
+        other = by_others.get(error.key, error)
+        apart_sd = float(np.hypot(error.sd, other.sd))
+        if abs(error.value - other.value) > APART_SD * apart_sd:
             yield finding(
                 "S501",
-                Where(plate=one.plate, part=f"{one} by {person}"),
-                error=Quantity(one.value, one.unit, sd=one.sd),
-                other_error=Quantity(other.value, one.unit, sd=other.sd),
-                sd=Quantity(apart_sd, one.unit, limit=APART_SD * apart_sd),
+                Where(plate=error.plate, part=f"{error} by {person}"),
+                error=Quantity(error.value, error.unit, sd=error.sd),
+                other_error=Quantity(other.value, error.unit, sd=other.sd),
+                sd=Quantity(apart_sd, error.unit, limit=APART_SD * apart_sd),
                 person=Quantity(person),
-                instrument=Quantity(str(one)),
+                instrument=Quantity(str(error)),
             )

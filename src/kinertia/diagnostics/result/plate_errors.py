@@ -99,9 +99,9 @@ def plate_positions(context: ResultContext) -> Iterator[Finding]:
     another plate may be the displaced one.
     """
     for axis in "xz":
-        errors = [one for one in context.errors if (one.quantity, one.axis) == (POSITION, axis)]
+        errors = [error for error in context.errors if (error.quantity, error.axis) == (POSITION, axis)]
         if equal(errors):
-            first = max(errors, key=lambda one: (one.supported, abs(one.value)))
+            first = max(errors, key=lambda error: (error.supported, abs(error.value)))
             yield correction("P246", "offset_m", context.along(axis, None), first)
         else:
             yield from corrected(context, "P246", "offset_m", errors)
@@ -113,7 +113,7 @@ def _ambiguous(context: ResultContext, axis: str, errors: Sequence[CalibrationEn
     it is what is ambiguous, but the difference of the plates must be certain.
     """
     prior, posterior = context.ready.uncertainty.instruments, context.fit.posterior
-    values = [one.value for one in errors if not one.contradicted_by]
+    values = [error.value for error in errors if not error.contradicted_by]
     if posterior is None or prior.plate[axis].fault_probability == 0.0 or not values:
         return []
     differ_m = max(values) - min(values)
@@ -142,20 +142,20 @@ def position_deviations(shown: InstrumentInformation, prior: InstrumentPrior, ax
         axis: "x" or "z".
     """
     priors, size = prior.of_unknowns(shown.plates), len(PLATE_UNKNOWNS)
-    own = np.array([one.faulty_sd for one in priors.individual])
-    common = np.array([one.faulty_sd for one, _ in priors.common])
-    own[size * len(shown.plates) + list(FLOOR_UNKNOWNS).index(axis)] = _FIXED_M
+    individual_sd = np.array([error_prior.faulty_sd for error_prior in priors.individual])
+    common = np.array([common_prior.faulty_sd for common_prior, _ in priors.common])
+    individual_sd[size * len(shown.plates) + list(FLOOR_UNKNOWNS).index(axis)] = _FIXED_M
     along = [size * plate + list(PLATE_UNKNOWNS).index(axis) for plate in range(len(shown.plates))]
-    own[along] = _OPEN_M
+    individual_sd[along] = _OPEN_M
     places = set(along)
-    for k, (one, members) in enumerate(priors.common):
+    for k, (common_prior, members) in enumerate(priors.common):
         if members[0] in places:
-            common[k], own[list(members)] = _OPEN_M, one.nominal_sd
-            places = places.difference(members) | {len(own) + k}
+            common[k], individual_sd[list(members)] = _OPEN_M, common_prior.nominal_sd
+            places = places.difference(members) | {len(individual_sd) + k}
     if len(places) < 2:
         return np.inf, 0.0
     known = shown.information + prior.of_session(shown.plates).information
-    information = priors.of_parts.T @ known @ priors.of_parts + np.diag(np.append(own, common) ** -2.0)
+    information = priors.of_parts.T @ known @ priors.of_parts + np.diag(np.append(individual_sd, common) ** -2.0)
     covariance = np.linalg.inv(information)[np.ix_(sorted(places), sorted(places))]
     from_middle = np.eye(len(places)) - 1.0 / len(places)
     apart = np.sqrt(np.diag(from_middle @ covariance @ from_middle.T)).max()
@@ -185,10 +185,10 @@ def common_offset(context: ResultContext) -> Iterator[Finding]:
 )
 def plate_rotation(context: ResultContext) -> Iterator[Finding]:
     """Report rotations that were corrected, of all plates or of one, and one too small for these trials to show."""
-    rotations = [one for one in context.errors if one.quantity == ROTATION]
+    rotations = [error for error in context.errors if error.quantity == ROTATION]
     usual_sd = context.ready.uncertainty.instruments.plate["turn"].sd
     if equal(rotations, usual_sd) or len(rotations) == 1:
-        largest = max(rotations, key=lambda one: abs(one.value))
+        largest = max(rotations, key=lambda error: abs(error.value))
         yield from corrected(context, "P234", "rotation_rad", [replace(largest, plate=None)], _LARGEST_RAD)
     else:
         yield from corrected(context, "P237", "rotation_rad", rotations, _LARGEST_RAD)
@@ -217,13 +217,13 @@ def smallest_detectable(shown: InstrumentInformation, prior: InstrumentPrior, un
 
 def smallest_detectable_of_one(shown: InstrumentInformation, prior: InstrumentPrior, unknown: str) -> float:
     """Return the same of an error of a single plate (one of PLATE_UNKNOWNS), whichever shows it least."""
-    first, each = list(PLATE_UNKNOWNS).index(unknown), len(PLATE_UNKNOWNS)
-    return max((_smallest(shown, prior, first + each * k) for k in range(len(shown.plates))), default=0.0)
+    first, count = list(PLATE_UNKNOWNS).index(unknown), len(PLATE_UNKNOWNS)
+    return max((_smallest(shown, prior, first + count * k) for k in range(len(shown.plates))), default=0.0)
 
 
 def _smallest(shown: InstrumentInformation, prior: InstrumentPrior, place: int) -> float:
     unknowns = prior.of_unknowns(shown.plates).individual
-    precision = np.array([0.0 if k == place else 1.0 / one.sd**2 for k, one in enumerate(unknowns)])
+    precision = np.array([0.0 if k == place else 1.0 / unknown_prior.sd**2 for k, unknown_prior in enumerate(unknowns)])
     information = shown.information + prior.of_session(shown.plates).information + np.diag(precision)
     if not information[place, place] > 0.0:
         return np.inf
@@ -234,52 +234,55 @@ def _smallest(shown: InstrumentInformation, prior: InstrumentPrior, place: int) 
 @check("P223", "P224", gain=reported(PLATE_PRIOR["gain"].sd, "1"), trial_gain=reported(_TRIAL_GAIN_SD, "1"))
 def gains(context: ResultContext) -> Iterator[Finding]:
     """Report gain errors that were corrected, and one that all plates share, in all trials or in one."""
-    errors = [one for one in context.errors if one.quantity == GAIN]
+    errors = [error for error in context.errors if error.quantity == GAIN]
     yield from corrected(context, "P223", "gain_error", _certain(errors))
-    lasting = [one for one in errors if one.trial is None]
+    lasting = [error for error in errors if error.trial is None]
     if equal(lasting):
         yield _of_all(context, lasting)
         return
-    usual = min((one.prior_sd for one in lasting), default=np.inf)
-    for trial in dict.fromkeys(one.trial for one in errors if one.trial is not None):
-        own = [one for one in errors if one.trial == trial]
-        if equal(own, usual):
-            yield _of_all(context, own)
+    usual = min((gain.prior_sd for gain in lasting), default=np.inf)
+    for trial in dict.fromkeys(error.trial for error in errors if error.trial is not None):
+        of_trial = [error for error in errors if error.trial == trial]
+        if equal(of_trial, usual):
+            yield _of_all(context, of_trial)
 
 
 @check("P288", log_odds=Limit(SURE))
 def missing_loads(context: ResultContext) -> Iterator[Finding]:
     """Report P288: plates of whose loads a part is missing, which is no error of their gain."""
     posterior = context.fit.posterior
-    for one in () if posterior is None else posterior.missing_loads:
-        missing = Quantity(one.missing, "1", sd=one.sd)
-        log_odds = Quantity(one.log_odds, "1", limit=SURE)
+    for missing_load in () if posterior is None else posterior.missing_loads:
+        missing = Quantity(missing_load.missing, "1", sd=missing_load.sd)
+        log_odds = Quantity(missing_load.log_odds, "1", limit=SURE)
         yield finding(
-            "P288", Where(trial=one.trial, plate=one.plate, span_s=one.span_s), missing=missing, log_odds=log_odds
+            "P288",
+            Where(trial=missing_load.trial, plate=missing_load.plate, span_s=missing_load.span_s),
+            missing=missing,
+            log_odds=log_odds,
         )
 
 
 def _of_all(context: ResultContext, gains: Sequence[CalibrationEntry]) -> Finding:
     """Report P224: a gain error of all plates, with the masses that the forces of the trials correspond to."""
     trial, total = gains[0].trial, context.ready.total_mass
-    sd, limit = max(one.sd for one in gains), 2.0 * gains[0].prior_sd
-    evidence = {"gain_error": Quantity(tuple(one.value for one in gains), "1", limit, sd=sd)}
+    sd, limit = max(gain.sd for gain in gains), 2.0 * gains[0].prior_sd
+    evidence = {"gain_error": Quantity(tuple(gain.value for gain in gains), "1", limit, sd=sd)}
     masses = tuple(float(mass.mass_kg) for name, mass in context.force_masses.items() if trial in (None, name))
     if masses:
         evidence["mass_by_force_kg"] = Quantity(masses, "kg")
     evidence["stated_kg"] = Quantity(total.total_kg, "kg", sd=total.sd_kg)
-    evidence["plates"] = Quantity(", ".join(str(one.plate) for one in gains))
+    evidence["plates"] = Quantity(", ".join(str(gain.plate) for gain in gains))
     return with_evidence("P224", Where(trial=trial), evidence, causes=_MORE if gains[0].value > 0.0 else _LESS)
 
 
 def _certain(errors: Sequence[CalibrationEntry]) -> Iterator[CalibrationEntry]:
     """Yield the gain of a plate over all trials where that is certain, else its gain in each trial."""
-    lasting = {one.plate: one for one in errors if one.trial is None}
-    of_trials = {one.plate for one in errors if one.trial is not None}
-    for one in errors:
-        whole = one.plate not in of_trials or lasting[one.plate].supported
-        if whole == (one.trial is None):
-            yield one
+    lasting = {error.plate: error for error in errors if error.trial is None}
+    of_trials = {error.plate for error in errors if error.trial is not None}
+    for error in errors:
+        whole = error.plate not in of_trials or lasting[error.plate].supported
+        if whole == (error.trial is None):
+            yield error
 
 
 @check(
@@ -298,20 +301,20 @@ def free_moments(context: ResultContext) -> Iterator[Finding]:
             yield with_evidence("P269", Where(), evidence)
         elif sign.open:
             yield with_evidence("P260", Where(), evidence)
-    errors = [one for one in context.errors if one.quantity == FREE_MOMENT]
+    errors = [error for error in context.errors if error.quantity == FREE_MOMENT]
     yield from corrected(context, "P267", "error_nm_n", errors)
     if mirrored(errors):
-        values = tuple(one.value for one in errors)
-        plates = Quantity(", ".join(str(one.plate) for one in errors))
+        values = tuple(error.value for error in errors)
+        plates = Quantity(", ".join(str(error.plate) for error in errors))
         yield finding("P268", error_nm_n=Quantity(values, "N m/N", 2.0 * errors[0].prior_sd), plates=plates)
 
 
 def mirrored(errors: Sequence[CalibrationEntry]) -> bool:
     """Return whether errors were found under both feet that mirror each other: opposite signs, similar sizes."""
-    off = [one.value for one in errors if one.found]
+    off = [error.value for error in errors if error.found]
     if not off or not min(off) < 0.0 < max(off):
         return False
-    return abs(sum(one.value for one in errors)) <= _ONE_SIDED * sum(abs(one.value) for one in errors)
+    return abs(sum(error.value for error in errors)) <= _ONE_SIDED * sum(abs(error.value) for error in errors)
 
 
 def reversed_sign(trial: TrialFit) -> Iterator[Finding]:

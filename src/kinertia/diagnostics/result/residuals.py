@@ -122,7 +122,7 @@ def residuals_of(trial: TrialFit, mass_kg: float) -> Iterator[Finding]:
     """Report R301, R302 and R303: residual forces and moments of one trial of a body of this mass."""
     if not trial.kinematics.complete:
         return
-    narrow, full = (_lengths(each["estimate"]) for each in (trial.residuals, trial.full_residuals))
+    narrow, full = (_lengths(loads["estimate"]) for loads in (trial.residuals, trial.full_residuals))
     for guideline, judged, whole in zip((FORCE, MOMENT), narrow, full, strict=True):
         harmless = guideline is FORCE and rms(judged) <= HARMLESS_N_PER_KG * mass_kg
         yield from _by_guideline(trial, guideline, judged, whole, harmless)
@@ -235,7 +235,7 @@ def moved_markers(context: ResultContext) -> Iterator[Finding]:
     loose, shoulders = _loose(context.fit.skeleton), _at_shoulders(context.fit.skeleton)
     for trial, noise in zip(context.fit.trials, posterior.marker_noise, strict=True):
         usual_m = float(np.median(list(noise.sd_m.values())))
-        for label in (one for one in noise.drifting if one not in loose):
+        for label in (drifting for drifting in noise.drifting if drifting not in loose):
             sd = Quantity(noise.sd_m[label], "m", limit=_DRIFTING * usual_m)
             yield finding("M163", Where(trial=trial.name, markers=(label,)), sd_m=sd, usual_sd_m=Quantity(usual_m, "m"))
     for trial, distances in zip(context.fit.trials, posterior.marker_distances_m, strict=False):
@@ -290,10 +290,10 @@ def corrected_joints(context: ResultContext) -> Iterator[Finding]:
 def _knee_axes(context: ResultContext) -> Iterator[Finding]:
     """Report M175: knees whose axis the trials show elsewhere than the static trial, by either of its two angles."""
     for side, name in _SIDES.items():
-        angles = [one for one in _calibrated(context) if one.joint == f"knee_{side}" and one.quantity == AXIS]
-        if any(one.found for one in angles):
-            worst = max(angles, key=lambda one: abs(one.value))
-            rotation_rad = float(np.linalg.norm([one.value for one in angles]))
+        angles = [entry for entry in _calibrated(context) if entry.joint == f"knee_{side}" and entry.quantity == AXIS]
+        if any(angle.found for angle in angles):
+            worst = max(angles, key=lambda angle: abs(angle.value))
+            rotation_rad = float(np.linalg.norm([angle.value for angle in angles]))
             rotation = Quantity(rotation_rad, "rad", limit=2.0 * worst.prior_sd, sd=worst.sd)
             yield finding("M175", Where(part=f"{name} knee"), rotation_rad=rotation)
 
@@ -307,7 +307,7 @@ def _calibrated(context: ResultContext) -> Sequence[CalibrationEntry]:
 def sideways_lean(context: ResultContext) -> Iterator[Finding]:
     """Report M145: an equal correction of all plates takes the loads away from both feet to one side."""
     across = [axis for axis in "xz" if context.along(axis, None).axis == _ACROSS]
-    errors = [one for one in context.errors if one.quantity == POSITION and one.axis in across]
+    errors = [error for error in context.errors if error.quantity == POSITION and error.axis in across]
     if len(across) != 1 or not equal(errors):
         return
     beside = [found for trial in context.fit.trials if (found := _beside_feet_m(context, trial)) is not None]
@@ -333,7 +333,7 @@ def _beside_feet_m(context: ResultContext, trial: TrialFit) -> tuple[float, floa
     """
     recorded, markers = trial.kinematics.trial, trial.kinematics.trial.markers
     owners = owners_of(context.fit.skeleton)
-    labels = {side: [one for one in markers.labels if owners.get(one) == f"foot_{side}"] for side in FEET}
+    labels = {side: [label for label in markers.labels if owners.get(label) == f"foot_{side}"] for side in FEET}
     feet = foot_trajectories(markers, labels, recorded.belt) if all(labels.values()) else None
     if feet is None:
         return None
@@ -348,9 +348,9 @@ def _beside_m(feet: tuple[FootTrajectory, FootTrajectory], time: np.ndarray, wre
     """Return how far (m) the loads (k, 2, 6) act to the right of the feet, each foot's mean weighted by its force."""
     beside = []
     for foot, trajectory in enumerate(feet):
-        own = wrench[:, foot]
-        firm = (own[:, 1] > FIRM_LOAD_N) & trajectory.seen(time)
-        place = centre_of_pressure(own[firm])[:, [0, 2]]
+        reaction = wrench[:, foot]
+        firm = (reaction[:, 1] > FIRM_LOAD_N) & trajectory.seen(time)
+        place = centre_of_pressure(reaction[firm])[:, [0, 2]]
         offset = trajectory.offset_m(time[firm], place)[:, 1]
-        beside.append(float(own[firm, 1] @ offset / own[firm, 1].sum()) if firm.any() else np.nan)
+        beside.append(float(reaction[firm, 1] @ offset / reaction[firm, 1].sum()) if firm.any() else np.nan)
     return float(np.mean(beside))

@@ -100,7 +100,7 @@ def suitability(fit: Fit, findings: Iterable[Finding], left_out: Sequence[str] =
         findings: findings of all stages, explained and overruled.
         left_out: trials that were blocked and are not in the fit: then nothing is used without care.
     """
-    known = [one for one in findings if one.where.trial not in left_out]
+    known = [reported for reported in findings if reported.where.trial not in left_out]
     return tuple(_output(fit, name, known, left_out) for name in _TITLES)
 
 
@@ -117,8 +117,8 @@ def informed(fit: Fit, output: str) -> Informed | None:
 
 
 def _output(fit: Fit, name: str, findings: Sequence[Finding], left_out: Sequence[str]) -> Suitability:
-    causes = [(one, _cause(one, findings)) for one in findings if _affects(one, name)]
-    lowering = [(cause.code, level) for one, cause in causes if (level := _level(one, cause))]
+    causes = [(reported, _cause(reported, findings)) for reported in findings if _affects(reported, name)]
+    lowering = [(cause.code, level) for effect, cause in causes if (level := _level(effect, cause))]
     levels, reasons = [level for _, level in lowering], []
     if name in GROUPS:
         level, reason = _of_parameters(fit, name)
@@ -131,48 +131,48 @@ def _output(fit: Fit, name: str, findings: Sequence[Finding], left_out: Sequence
     if left_out:
         levels.append(1)
         reasons.append(f"{len(left_out)} of {len(fit.trials) + len(left_out)} trials left out")
-    codes = tuple(dict.fromkeys(code for code, _ in sorted(lowering, key=lambda each: -each[1])))
+    codes = tuple(dict.fromkeys(code for code, _ in sorted(lowering, key=lambda lowering_code: -lowering_code[1])))
     if codes:
         reasons.append(f"see {', '.join(codes)}")
     return Suitability(_TITLES[name], _ORDER[max(levels, default=0)], "; ".join(reasons), codes)
 
 
-def _affects(one: Finding, output: str) -> bool:
+def _affects(reported: Finding, output: str) -> bool:
     """Return whether a finding concerns an output, so that it, or what explains it, lowers it."""
-    return one.severity >= Severity.WARNING and output in one.rule.affects and _concerns(one, output)
+    return reported.severity >= Severity.WARNING and output in reported.rule.affects and _concerns(reported, output)
 
 
-def _cause(one: Finding, findings: Sequence[Finding]) -> Finding:
+def _cause(reported: Finding, findings: Sequence[Finding]) -> Finding:
     """Return the finding that explains this one, directly or through others; itself if none does.
 
     A finding knows its cause by code alone: of several at its place, an unexplained one is the cause, and none twice.
     """
-    followed = [one]
+    followed = [reported]
     while followed[-1].muted_by is not None:
         last = followed[-1]
         causes = [
-            each
-            for each in findings
-            if each.code == last.muted_by
-            and each.where.overlaps(last.where)
-            and not any(each is other for other in followed)
+            candidate
+            for candidate in findings
+            if candidate.code == last.muted_by
+            and candidate.where.overlaps(last.where)
+            and not any(candidate is other for other in followed)
         ]
         if not causes:
             break
-        followed.append(min(causes, key=lambda each: each.muted_by is not None))
+        followed.append(min(causes, key=lambda candidate: candidate.muted_by is not None))
     return followed[-1]
 
 
-def _level(one: Finding, cause: Finding) -> int:
+def _level(reported: Finding, cause: Finding) -> int:
     """Return by how many steps of _ORDER a finding lowers an output, given the one that explains it."""
     if cause.status == "ignored" or cause.severity < Severity.WARNING:
         return 0
-    return 2 if one.severity is Severity.ERROR and cause.status == "open" else 1
+    return 2 if reported.severity is Severity.ERROR and cause.status == "open" else 1
 
 
-def _concerns(one: Finding, output: str) -> bool:
+def _concerns(reported: Finding, output: str) -> bool:
     """Return whether an implausible parameter belongs to the output."""
-    parameter = one.evidence.get("parameter")
+    parameter = reported.evidence.get("parameter")
     return parameter is None or output not in GROUPS or str(parameter.value).startswith(GROUPS[output].start)
 
 
@@ -228,9 +228,9 @@ def _motion(fit: Fit) -> str:
     return f"{reason}; typical 95 % interval of a joint angle: ± {np.degrees(half):.1f} degrees"
 
 
-def _half_interval(fit: Fit, of: Literal["moments", "coordinates"]) -> float | None:
+def _half_interval(fit: Fit, kind: Literal["moments", "coordinates"]) -> float | None:
     """Return half a typical 95 % interval of the rotations after the pelvis; None without their SDs."""
-    sds = [getattr(trial.deviations, of)[:, 6:] for trial in fit.trials if trial.deviations is not None]
+    sds = [getattr(trial.deviations, kind)[:, 6:] for trial in fit.trials if trial.deviations is not None]
     turns = fit.skeleton.rotational[6:]
     every = np.concatenate(sds)[:, turns] if sds else np.zeros(0)
     return _BAND_SD * rms(every) if np.isfinite(every).any() else None

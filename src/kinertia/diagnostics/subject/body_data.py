@@ -44,10 +44,10 @@ def stated_and_filed(context: PersonContext) -> Iterator[Finding]:
     for name, (quantity, unit) in _QUANTITIES.items():
         stated = getattr(context.subject, name)
         in_files: dict[float, list[str]] = {}
-        for one in (*context.standing, *context.trials):
-            filed = getattr(one.recording, name)
+        for recording in (*context.standing, *context.trials):
+            filed = getattr(recording.recording, name)
             if stated is not None and filed is not None and abs(filed - stated) > _SAME * stated:
-                in_files.setdefault(filed, []).append(one.name)
+                in_files.setdefault(filed, []).append(recording.name)
         for filed, names in in_files.items():
             confirmed = name == "mass_kg" and weighed_as_stated(context, filed)
             yield finding(
@@ -85,7 +85,7 @@ def stature(context: RecordingContext) -> Iterator[Finding]:
         return
     marks = find_landmarks(context.recording, context.marker_set)
     lengths = [
-        sum(float(np.linalg.norm(marks[f"{one}_{side}"] - marks[f"{other}_{side}"])) for one, other in _PARTS)
+        sum(float(np.linalg.norm(marks[f"{upper}_{side}"] - marks[f"{other}_{side}"])) for upper, other in _PARTS)
         for side in "rl"
         if all(f"{name}_{side}" in marks for pair in _PARTS for name in pair)
     ]
@@ -118,9 +118,9 @@ def unobserved_segments(skeleton: Skeleton) -> Iterator[Finding]:
         yield _unobserved("arms", _HANGING, (0.1, 5.0))
     if locked and not joined:
         for side in "rl":
-            own = {name.removesuffix(f"_{side}") for name in locked if name.endswith(f"_{side}")}
-            if own:
-                part = in_words(f"{'forearm' if own == {'elbow_flex'} else 'arm'}_{side}")
+            locked_of_side = {name.removesuffix(f"_{side}") for name in locked if name.endswith(f"_{side}")}
+            if locked_of_side:
+                part = in_words(f"{'forearm' if locked_of_side == {'elbow_flex'} else 'arm'}_{side}")
                 yield _unobserved(part, _HANGING.replace("them", "it"), (0.0, 5.0))
 
 

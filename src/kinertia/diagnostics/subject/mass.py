@@ -94,20 +94,20 @@ def stated_mass(context: PersonContext) -> Iterator[Finding]:
     total = context.total_mass
     if total is None:
         return
-    known = {one.name: mass for one in context.trials if (mass := one.force_mass) is not None}
+    known = {trial.name: mass for trial in context.trials if (mass := trial.force_mass) is not None}
     apart = _apart(context, total)
     for name, found in apart.items():
         missing, complete = Quantity(found.missing, "1", limit=MISSING), Quantity(found.complete, "1")
         yield finding("P281", Where(trial=name, span_s=found.span_s), missing=missing, complete=complete)
     whole, standing = _whole(context, apart), [*_standing(context)]
     partly = [_occasion(name, known[name]) for name in apart]
-    for one in [*_together([*whole, *standing]), *partly]:
-        if one.differs(total, WARNING_SHARE):
+    for occasion in [*_together([*whole, *standing]), *partly]:
+        if occasion.differs(total, WARNING_SHARE):
             # nothing is computed from the forces of a person who stands
-            most = Severity.ERROR if not one.standing else Severity.INFO if known else Severity.WARNING
-            witnesses = standing or [other for other in whole if other.trial != one.trial]
-            for each in _contradiction(context, one, total, witnesses):
-                yield each.at(min(each.severity, most))
+            most = Severity.ERROR if not occasion.standing else Severity.INFO if known else Severity.WARNING
+            witnesses = standing or [other for other in whole if other.trial != occasion.trial]
+            for contradiction in _contradiction(context, occasion, total, witnesses):
+                yield contradiction.at(min(contradiction.severity, most))
 
 
 def weighed_as_stated(context: PersonContext, other_kg: float) -> bool:
@@ -118,9 +118,9 @@ def weighed_as_stated(context: PersonContext, other_kg: float) -> bool:
     weighed = _together([*_whole(context, _apart(context, total)), *_standing(context)])
     attached_kg = total.total_kg - total.body_kg
     return bool(weighed) and all(
-        not one.differs(total, WARNING_SHARE)
-        and abs(one.mass_kg - total.total_kg) < abs(one.mass_kg - other_kg - attached_kg)
-        for one in weighed
+        not occasion.differs(total, WARNING_SHARE)
+        and abs(occasion.mass_kg - total.total_kg) < abs(occasion.mass_kg - other_kg - attached_kg)
+        for occasion in weighed
     )
 
 
@@ -129,16 +129,16 @@ def masses_of_trials(context: PersonContext) -> Iterator[Finding]:
     """Report S306: of two trials whose forces give different masses, the one that static trial, other trials and stated
     mass contradict.
     """
-    known = {one.name: one.force_mass for one in context.trials if one.force_mass is not None}
-    standing = [one.mass_kg for one in _standing(context)]
-    for (first, own), (other, others) in combinations(known.items(), 2):
-        lighter_kg = min(own.mass_kg, others.mass_kg)
-        allowed = ERROR_SHARE * lighter_kg + 2.0 * float(np.hypot(own.sd_kg, others.sd_kg))
-        if abs(own.mass_kg - others.mass_kg) <= allowed:
+    known = {trial.name: trial.force_mass for trial in context.trials if trial.force_mass is not None}
+    standing = [occasion.mass_kg for occasion in _standing(context)]
+    for (first, first_mass), (other, others) in combinations(known.items(), 2):
+        lighter_kg = min(first_mass.mass_kg, others.mass_kg)
+        allowed = ERROR_SHARE * lighter_kg + 2.0 * float(np.hypot(first_mass.sd_kg, others.sd_kg))
+        if abs(first_mass.mass_kg - others.mass_kg) <= allowed:
             continue
         further = [mass.mass_kg for name, mass in known.items() if name not in (first, other)]
         stated = [] if context.total_mass is None else [context.total_mass.total_kg]
-        witnesses = [(abs(kg - own.mass_kg), abs(kg - others.mass_kg)) for kg in (*standing, *further, *stated)]
+        witnesses = [(abs(kg - first_mass.mass_kg), abs(kg - others.mass_kg)) for kg in (*standing, *further, *stated)]
         for odd in odd_ones(first, other, witnesses):
             peer = other if odd == first else first
             yield finding(
@@ -156,44 +156,48 @@ def _occasion(name: str | None, mass: ForceMass, standing: bool = False) -> _Occ
 
 def _apart(context: PersonContext, total: TotalMass) -> dict[str, UnmeasuredSupport]:
     """Return the trials by name in which part of the weight is off the plates for a while."""
-    known = {one.name: one.force_mass for one in context.trials if one.force_mass is not None}
+    known = {trial.name: trial.force_mass for trial in context.trials if trial.force_mass is not None}
     return {name: found for name, mass in known.items() if (found := mass.unmeasured(total.total_kg)) is not None}
 
 
 def _whole(context: PersonContext, apart: Container[str]) -> list[_Occasion]:
     """Return the masses of the trials in which all of the weight is on the plates."""
     by_plates = _by_plates(context)
-    better = {one.trial for one in by_plates}
-    known = ((one.name, one.force_mass) for one in context.trials if one.name not in apart and one.name not in better)
+    better = {occasion.trial for occasion in by_plates}
+    known = (
+        (trial.name, trial.force_mass)
+        for trial in context.trials
+        if trial.name not in apart and trial.name not in better
+    )
     return [*by_plates, *(_occasion(name, mass) for name, mass in known if mass is not None)]
 
 
 def _by_plates(context: PersonContext) -> list[_Occasion]:
     """Return masses by plates that support a whole foot, where another foot beyond its plate leaves hardly a window."""
     found = []
-    for one in context.trials:
-        weighed = one.force_mass
-        if one.plates is None or (weighed is not None and weighed.sd_kg < _SINGLE_SUPPORT * weighed.mass_kg):
+    for trial in context.trials:
+        weighed = trial.force_mass
+        if trial.plates is None or (weighed is not None and weighed.sd_kg < _SINGLE_SUPPORT * weighed.mass_kg):
             continue
-        masses_kg = [*one.whole_plate_masses.values()]
-        if masses_kg and one.plates_reached_beyond:
+        masses_kg = [*trial.whole_plate_masses.values()]
+        if masses_kg and trial.plates_reached_beyond:
             mass_kg = float(np.mean(masses_kg))
             sd_kg = _SINGLE_SUPPORT * mass_kg / len(masses_kg) ** 0.5
-            found.append(_Occasion(one.name, mass_kg, sd_kg, "single support"))
+            found.append(_Occasion(trial.name, mass_kg, sd_kg, "single support"))
     return found
 
 
 def _standing(context: PersonContext) -> Iterator[_Occasion]:
     """Yield masses while the person stands still with both feet on plates: in static trials, and during others."""
-    for one in (*context.standing, *context.trials):
-        still = one.standing_mass
-        other_way = one.is_static or one.force_mass is None or one.travel.kind != "stands still"
-        if still is not None and one.plates is not None and other_way:
-            mass_kg = still.mass_kg - _level_kg(context, one.plates, still.plates)
+    for recording in (*context.standing, *context.trials):
+        still = recording.standing_mass
+        other_way = recording.is_static or recording.force_mass is None or recording.travel.kind != "stands still"
+        if still is not None and recording.plates is not None and other_way:
+            mass_kg = still.mass_kg - _level_kg(context, recording.plates, still.plates)
             sd_kg = float(np.hypot(still.sd_kg, _REPEATED * mass_kg))
-            yield _Occasion(one.name, mass_kg, sd_kg, "standing", True)
-        elif one.is_static and one.force_mass is not None:
-            yield _occasion(one.name, one.force_mass, True)
+            yield _Occasion(recording.name, mass_kg, sd_kg, "standing", True)
+        elif recording.is_static and recording.force_mass is not None:
+            yield _occasion(recording.name, recording.force_mass, True)
 
 
 def _level_kg(context: PersonContext, plates: PlateLoads, loaded: Sequence[str]) -> float:
@@ -218,21 +222,21 @@ def _together(occasions: Sequence[_Occasion]) -> list[_Occasion]:
     """Combine the masses into one where they agree, else keep each."""
     if len(occasions) < 2:
         return list(occasions)
-    weights = np.array([one.sd_kg**-2 for one in occasions])
-    mass_kg = float(weights @ [one.mass_kg for one in occasions] / weights.sum())
+    weights = np.array([occasion.sd_kg**-2 for occasion in occasions])
+    mass_kg = float(weights @ [occasion.mass_kg for occasion in occasions] / weights.sum())
     sd_kg = float(weights.sum() ** -0.5)
-    for one, two in combinations(occasions, 2):
-        if abs(one.mass_kg - two.mass_kg) > WARNING_SHARE * mass_kg + 2.0 * float(np.hypot(one.sd_kg, two.sd_kg)):
+    for first, two in combinations(occasions, 2):
+        if abs(first.mass_kg - two.mass_kg) > WARNING_SHARE * mass_kg + 2.0 * float(np.hypot(first.sd_kg, two.sd_kg)):
             return list(occasions)
-    over = " and ".join(dict.fromkeys(one.over for one in occasions))
-    return [_Occasion(None, mass_kg, sd_kg, over, count=len({one.trial for one in occasions}))]
+    over = " and ".join(dict.fromkeys(occasion.over for occasion in occasions))
+    return [_Occasion(None, mass_kg, sd_kg, over, count=len({occasion.trial for occasion in occasions}))]
 
 
 def _contradiction(
-    context: PersonContext, one: _Occasion, total: TotalMass, witnesses: Sequence[_Occasion]
+    context: PersonContext, occasion: _Occasion, total: TotalMass, witnesses: Sequence[_Occasion]
 ) -> Iterator[Finding]:
     """Report S111, with the causes that the evidence supports, and the unit that explains it."""
-    where, ratio = Where(trial=one.trial), one.mass_kg / total.total_kg
+    where, ratio = Where(trial=occasion.trial), occasion.mass_kg / total.total_kg
     stated_kg = context.subject.mass_kg
     if _near(ratio, _POUND):
         pounds = {"ratio": Quantity(ratio, "1")}
@@ -245,56 +249,58 @@ def _contradiction(
             yield finding("P202", where, unit=Quantity(unit), ratio=Quantity(ratio, "1"))
     by_plate: dict[str, float] = {}
     for trial in context.trials:
-        by_plate |= trial.whole_plate_masses if one.trial in (None, trial.name) else {}
-    causes, action = _causes(one, total.total_kg, by_plate, witnesses)
-    heavier = one.mass_kg > total.total_kg
-    limit = total.total_kg + (1.0 if heavier else -1.0) * one.allowed_kg(total, WARNING_SHARE)
+        by_plate |= trial.whole_plate_masses if occasion.trial in (None, trial.name) else {}
+    causes, action = _causes(occasion, total.total_kg, by_plate, witnesses)
+    heavier = occasion.mass_kg > total.total_kg
+    limit = total.total_kg + (1.0 if heavier else -1.0) * occasion.allowed_kg(total, WARNING_SHARE)
     evidence = {
-        "mass_by_force_kg": Quantity(one.mass_kg, "kg", limit=limit, sd=one.sd_kg),
+        "mass_by_force_kg": Quantity(occasion.mass_kg, "kg", limit=limit, sd=occasion.sd_kg),
         "stated_kg": Quantity(total.total_kg, "kg", sd=total.sd_kg),
         "attached_kg": Quantity(total.total_kg - total.body_kg, "kg"),
-        "agreeing": Quantity(_agreeing(one, total.total_kg, by_plate, witnesses), "1"),
-        "method": Quantity(f"marker-based centre of mass over {one.over}"),
+        "agreeing": Quantity(_agreeing(occasion, total.total_kg, by_plate, witnesses), "1"),
+        "method": Quantity(f"marker-based centre of mass over {occasion.over}"),
         "action": Quantity(action),
     }
     if stated_kg is not None and any(words in action for words in _MASS_ACTIONS):
-        evidence["mass_kg"] = Quantity(stated_kg + one.mass_kg - total.total_kg, "kg", sd=one.sd_kg)
-    for standing in [each for each in witnesses if each.standing][:1]:
+        evidence["mass_kg"] = Quantity(stated_kg + occasion.mass_kg - total.total_kg, "kg", sd=occasion.sd_kg)
+    for standing in [witness for witness in witnesses if witness.standing][:1]:
         evidence["static_kg"] = Quantity(standing.mass_kg, "kg", sd=standing.sd_kg)
     if len(by_plate) > 1:
         evidence["plates_kg"] = Quantity(tuple(by_plate.values()), "kg")
-    severity = Severity.ERROR if one.differs(total, one.error_share) else Severity.WARNING
+    severity = Severity.ERROR if occasion.differs(total, occasion.error_share) else Severity.WARNING
     yield finding("S111", where, severity, causes, **evidence)
 
 
-def _agreeing(one: _Occasion, stated_kg: float, by_plate: Mapping[str, float], witnesses: Sequence[_Occasion]) -> int:
+def _agreeing(
+    occasion: _Occasion, stated_kg: float, by_plate: Mapping[str, float], witnesses: Sequence[_Occasion]
+) -> int:
     """Count occasions that agree, or plates that agree on a single occasion that no other contradicts."""
-    if one.count > 1 or not by_plate:
-        return one.count
+    if occasion.count > 1 or not by_plate:
+        return occasion.count
     alike = max(by_plate.values()) <= (1.0 + _SAME) * min(by_plate.values())
-    against = any(abs(each.mass_kg - stated_kg) < abs(each.mass_kg - one.mass_kg) for each in witnesses)
+    against = any(abs(witness.mass_kg - stated_kg) < abs(witness.mass_kg - occasion.mass_kg) for witness in witnesses)
     return len(by_plate) if alike and not against else 1
 
 
 def _causes(
-    one: _Occasion, stated_kg: float, by_plate: Mapping[str, float], witnesses: Sequence[_Occasion]
+    occasion: _Occasion, stated_kg: float, by_plate: Mapping[str, float], witnesses: Sequence[_Occasion]
 ) -> tuple[tuple[str, ...], str]:
     """Return the causes, likeliest first, and the remedy for the first."""
-    heavier = one.mass_kg > stated_kg
+    heavier = occasion.mass_kg > stated_kg
     other = _LOAD if heavier else _SUPPORT
-    if _near(one.mass_kg / stated_kg, 1.0 / _POUND):
+    if _near(occasion.mass_kg / stated_kg, 1.0 / _POUND):
         return (_STATED_OVER_POUND, _STATED), "Give the mass in kg"
     light, *_, heavy = sorted(by_plate, key=by_plate.__getitem__) if len(by_plate) > 1 else ("", "")
     if light and by_plate[heavy] > (1.0 + _SAME) * by_plate[light]:
         plate, right = (heavy, light) if heavier else (light, heavy)
         if abs(by_plate[right] / stated_kg - 1.0) <= _SAME:
             return (f"gain or zero of {plate}", other, _STATED), f"Check {plate} with a known weight"
-    nearer = [abs(each.mass_kg - one.mass_kg) < abs(each.mass_kg - stated_kg) for each in witnesses]
+    nearer = [abs(witness.mass_kg - occasion.mass_kg) < abs(witness.mass_kg - stated_kg) for witness in witnesses]
     if nearer and 2 * sum(nearer) < len(nearer):
         action = "Check the plates with a known weight, unless something was carried"
         return (_PLATES, other), action if heavier else "Check the plates with a known weight"
     if not nearer and len(by_plate) < 2:
-        if heavier and one.mass_kg - stated_kg > _LOAD_KG:
+        if heavier and occasion.mass_kg - stated_kg > _LOAD_KG:
             return (other, _STATED, _PLATES), "Declare what was worn or carried as [[attached]], or correct the mass"
         return (_STATED, _PLATES, other), "Check the mass, and gain and zero of the plates"
     carried = ", or declare what was worn or carried as [[attached]]" if heavier else ""

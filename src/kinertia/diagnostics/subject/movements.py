@@ -53,12 +53,14 @@ class InformativeMovements:
         """Compute the movement from markers with these labels; None where no frame shows all that are ever visible."""
         middles = []
         for labels in (pelvis, torso):
-            own = markers.positions[:, [markers.labels.index(label) for label in labels if label in markers.labels]]
-            used = np.isfinite(own).any(axis=(0, 2))
+            of_segment = markers.positions[
+                :, [markers.labels.index(label) for label in labels if label in markers.labels]
+            ]
+            used = np.isfinite(of_segment).any(axis=(0, 2))
             if not used.any():
                 return None
             # of the same markers in every frame, or a gap would move their middle
-            middles.append(own[:, used].mean(axis=1))
+            middles.append(of_segment[:, used].mean(axis=1))
         shown = np.isfinite(middles).all(axis=(0, 2))
         if not shown.any():
             return None
@@ -90,13 +92,13 @@ class InformativeMovements:
 @check("S312", sway=SWAY_RAD, squat=SQUAT_M)
 def informative_movements(context: PersonContext) -> Iterator[Finding]:
     """Report S312: no trial with forces shows trunk sway, or none shows squats."""
-    measured = [movements_of(one) for one in context.trials if one.plates is not None]
-    known = [one for one in measured if one is not None]
+    measured = [movements_of(trial) for trial in context.trials if trial.plates is not None]
+    known = [movements for movements in measured if movements is not None]
     lacking = [
         name
         for name, there in (
-            ("trunk sway", any(one.sways for one in known)),
-            ("squats", any(one.squats for one in known)),
+            ("trunk sway", any(movements.sways for movements in known)),
+            ("squats", any(movements.squats for movements in known)),
         )
         if not there
     ]
@@ -104,8 +106,8 @@ def informative_movements(context: PersonContext) -> Iterator[Finding]:
         yield finding(
             "S312",
             movements=Quantity(" or ".join(lacking)),
-            lean_rad=Quantity(max(one.trunk_lean_rad for one in known), "rad", limit=SWAY_RAD),
-            drop_m=Quantity(max(one.drop_m for one in known), "m", limit=SQUAT_M),
+            lean_rad=Quantity(max(movements.trunk_lean_rad for movements in known), "rad", limit=SWAY_RAD),
+            drop_m=Quantity(max(movements.drop_m for movements in known), "m", limit=SQUAT_M),
         )
 
 
@@ -166,11 +168,11 @@ def standing(context: RecordingContext) -> Iterator[Finding]:
 @check("S207", "S208")
 def no_static(context: PersonContext) -> Iterator[Finding]:
     """Report S207: there is neither a static trial nor a model, and a walk replaces them; S208: no walk can."""
-    unread = any(one.rule.stage == "file" and one.where.trial is None for one in context.found)
+    unread = any(reported.rule.stage == "file" and reported.where.trial is None for reported in context.found)
     if not context.trials or context.standing or context.model or context.files_only or unread:
         return
     yield finding("S207", centre_sd_m=Quantity(WITHOUT_STATIC * JOINT_CENTRE_SD_M, "m"))
-    measured = [one.recording for one in context.trials if one.recording.plates is not None]
+    measured = [trial.recording for trial in context.trials if trial.recording.plates is not None]
     if measured and context.marker_set and (hidden := hidden_landmarks(measured[0].markers, context.marker_set)):
         yield finding("S208", landmarks=Quantity(", ".join(hidden)))
 
@@ -184,13 +186,13 @@ def flat_feet(context: RecordingContext) -> Iterator[Finding]:
     apart = {}
     for name in ("heel", "metatarsal"):
         labels = (context.marker_set.landmarks.get(f"{name}_{side}", ())[:1] for side in "rl")
-        heights = [context.all_markers.arranged(own)[..., 1] for own in labels]
-        if all(np.isfinite(each).any() for each in heights):
-            right_m, left_m = (float(np.nanmedian(each)) for each in heights)
+        heights = [context.all_markers.arranged(of_foot)[..., 1] for of_foot in labels]
+        if all(np.isfinite(height).any() for height in heights):
+            right_m, left_m = (float(np.nanmedian(height)) for height in heights)
             apart[name] = right_m - left_m
     if not apart:
         return
-    landmark, higher_m = max(apart.items(), key=lambda one: abs(one[1]))
+    landmark, higher_m = max(apart.items(), key=lambda landmark_height: abs(landmark_height[1]))
     if abs(higher_m) >= _FLAT_M:
         yield finding(
             "S202",

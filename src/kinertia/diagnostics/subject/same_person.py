@@ -76,7 +76,7 @@ def static_and_trials(context: PersonContext) -> Iterator[Finding]:
     if marker_set is None:
         return
     # labels that are swapped in a static trial put its distances wrong
-    references = [one for one in context.standing if not context.has_error(one.name, "L20")]
+    references = [standing for standing in context.standing if not context.has_error(standing.name, "L20")]
     for trial in context.trials:
         found = [
             list(_against(reference, trial, marker_set, trial.name, _called(context, reference), AGAINST_STANDING))
@@ -85,8 +85,8 @@ def static_and_trials(context: PersonContext) -> Iterator[Finding]:
         if all(found):
             yield from _joined(found)
             continue
-        for reference, own in zip(references, found, strict=True):
-            if own:
+        for reference, of_reference in zip(references, found, strict=True):
+            if of_reference:
                 yield from _against(
                     trial, reference, marker_set, reference.name, f"trial {trial.name}", -AGAINST_STANDING
                 )
@@ -108,7 +108,7 @@ def trials_of_one_person(context: PersonContext) -> Iterator[Finding]:
         moved = _moved_markers(distances, _MOVED_BETWEEN_M, _MOVED_SHARE)
         if not moved and (len(distances.pairs) < FEWEST_PAIRS or abs(ratio - 1.0) <= _OTHER_PERSON):
             continue
-        further = [one for one in (*context.standing, *context.trials) if one not in (first, other)]
+        further = [recording for recording in (*context.standing, *context.trials) if recording not in (first, other)]
         for odd in odd_ones(first, other, _witnesses(first, other, further, marker_set, moved)):
             peer = other if odd is first else first
             yield from _moved_findings(moved, odd.name, f"trial {peer.name}")
@@ -132,7 +132,7 @@ def _against(
         return
     swapped = list(swapped_labels(distances, at, called))
     yield from swapped
-    exchanged = {label for one in swapped for label in one.where.markers}
+    exchanged = {label for swap in swapped for label in swap.where.markers}
     moved = _moved_markers(distances, _MOVED_M, 0.0, exchanged)
     count, rms_m = len(distances.pairs), rms(distances.differences())
     if count >= FEWEST_PAIRS:
@@ -189,10 +189,10 @@ def _other_person(
 
 def _other_body_data(reference: RecordingContext, trial: RecordingContext) -> str:
     """Describe how mass or stature of two recordings differ: stated in their files, else as their plates weigh them."""
-    one, other = reference.recording, trial.recording
+    expected, other = reference.recording, trial.recording
     for first, second, limit, unit in (
-        (one.mass_kg, other.mass_kg, _OTHER_MASS, "kg"),
-        (one.height_m, other.height_m, _OTHER_STATURE, "m"),
+        (expected.mass_kg, other.mass_kg, _OTHER_MASS, "kg"),
+        (expected.height_m, other.height_m, _OTHER_STATURE, "m"),
     ):
         if first and second and abs(np.log(second / first)) > limit:
             return f"; its file states {first:.4g} {unit}, that of {trial.name} {second:.4g} {unit}"
@@ -224,11 +224,13 @@ def _moved_markers(
     before, after = distances.lengths()
     far = (np.abs(off) > least_m) & (np.abs(off) > least_share * np.minimum(before, after))
     moved: list[_Moved] = []
-    kept = ~np.isin(distances.pairs, [k for k, one in enumerate(distances.labels) if one in exchanged]).any(axis=1)
+    kept = ~np.isin(distances.pairs, [k for k, label_ in enumerate(distances.labels) if label_ in exchanged]).any(
+        axis=1
+    )
     while (far & kept).any() and len(moved) < _MOST_MOVED:
         # one marker that moved takes all of its distances along
         about = [np.abs(off[kept & _with(distances, k)]) for k in range(len(distances.labels))]
-        k = int(np.argmax([np.median(one) if len(one) else 0.0 for one in about]))
+        k = int(np.argmax([np.median(distances_m) if len(distances_m) else 0.0 for distances_m in about]))
         mates = distances.pairs[far & kept & _with(distances, k)]
         if not len(mates):
             return ()
@@ -249,12 +251,12 @@ def _with(distances: SegmentDistances, k: int) -> NDArray[np.bool_]:
 
 
 def _moved_findings(moved: Sequence[_Moved], at: str, called: str) -> Iterator[Finding]:
-    for one in moved:
+    for marker in moved:
         yield finding(
             "M161",
-            Where(trial=at, markers=one.labels),
-            difference_m=Quantity(one.difference_m, "m", limit=_MOVED_M, usual=_MOVED_M.usual),
-            to_marker=Quantity(one.to_marker),
+            Where(trial=at, markers=marker.labels),
+            difference_m=Quantity(marker.difference_m, "m", limit=_MOVED_M, usual=_MOVED_M.usual),
+            to_marker=Quantity(marker.to_marker),
             reference=Quantity(called),
         )
 
@@ -274,16 +276,18 @@ def _witnesses(
     moved: Sequence[_Moved],
 ) -> list[_Witness]:
     """Compute distances (m, or log of a ratio) of further recordings, from the moved markers, else from all."""
-    about = {label for one in moved for label in one.labels}
+    about = {label for marker in moved for label in marker.labels}
 
-    def apart(one: RecordingContext, two: RecordingContext) -> float:
-        distances = SegmentDistances.of(one.all_markers, two.all_markers, marker_set)
+    def apart(recording: RecordingContext, two: RecordingContext) -> float:
+        distances = SegmentDistances.of(recording.all_markers, two.all_markers, marker_set)
         if not moved:
             return abs(float(np.log(distances.ratio()))) if len(distances.pairs) else np.nan
-        own = np.isin(distances.pairs, [k for k, label in enumerate(distances.labels) if label in about]).any(axis=1)
-        return float(np.abs(distances.differences()[own]).max()) if own.any() else np.nan
+        involved = np.isin(distances.pairs, [k for k, label in enumerate(distances.labels) if label in about]).any(
+            axis=1
+        )
+        return float(np.abs(distances.differences()[involved]).max()) if involved.any() else np.nan
 
-    return [_Witness(apart(one, first), apart(one, other)) for one in further]
+    return [_Witness(apart(witness, first), apart(witness, other)) for witness in further]
 
 
 def _called(context: PersonContext, reference: RecordingContext) -> str:
@@ -293,12 +297,12 @@ def _called(context: PersonContext, reference: RecordingContext) -> str:
 def _joined(found: Sequence[Sequence[Finding]]) -> Iterator[Finding]:
     """Merge the same finding against several references into one, with all their names."""
     merged: dict[tuple[str, Where], Finding] = {}
-    for one in (each for own in found for each in own):
-        key = one.code, one.where
+    for reported in (unmerged for of_reference in found for unmerged in of_reference):
+        key = reported.code, reported.where
         if key in merged:
-            names = Quantity(f"{merged[key].evidence['reference'].value} and {one.evidence['reference'].value}")
-            one = replace(merged[key], evidence={**merged[key].evidence, "reference": names})
-        merged[key] = one
+            names = Quantity(f"{merged[key].evidence['reference'].value} and {reported.evidence['reference'].value}")
+            reported = replace(merged[key], evidence={**merged[key].evidence, "reference": names})
+        merged[key] = reported
     yield from merged.values()
 
 
@@ -308,18 +312,18 @@ def repeated_trials(context: PersonContext) -> Iterator[Finding]:
     for first, other in combinations(context.trials, 2):
         if not _overlap(first.window_s, other.window_s):
             continue
-        one, two = first.recording, other.recording
-        if _same(one.markers.positions, two.markers.positions):
+        recording, two = first.recording, other.recording
+        if _same(recording.markers.positions, two.markers.positions):
             code = "S302"
-        elif _same_forces(one, two) and _overlap(_span(one), _span(two)):
+        elif _same_forces(recording, two) and _overlap(_span(recording), _span(two)):
             code = "S303"
         else:
             continue
         yield finding(code, Where(trial=other.name), other_trial=Quantity(first.name))
 
 
-def _same(one: np.ndarray, two: np.ndarray) -> bool:
-    return one.shape == two.shape and bool(np.array_equal(one, two, equal_nan=True))
+def _same(positions: np.ndarray, two: np.ndarray) -> bool:
+    return positions.shape == two.shape and bool(np.array_equal(positions, two, equal_nan=True))
 
 
 def _same_forces(first: Recording, other: Recording) -> bool:
@@ -334,5 +338,5 @@ def _span(recording: Recording) -> tuple[float, float]:
     return float(recording.markers.time[0]), float(recording.markers.time[-1])
 
 
-def _overlap(one: Span, two: Span) -> bool:
-    return one is None or two is None or (one[0] < two[1] and two[0] < one[1])
+def _overlap(span: Span, two: Span) -> bool:
+    return span is None or two is None or (span[0] < two[1] and two[0] < span[1])

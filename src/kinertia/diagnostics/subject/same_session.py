@@ -108,8 +108,8 @@ def trial_scales(context: PersonContext) -> Iterator[Finding]:
     if marker_set is None:
         return
 
-    def between(one: RecordingContext, two: RecordingContext, usual: float = 0.0) -> CameraScale | None:
-        return _scale(SegmentDistances.of(one.all_markers, two.all_markers, marker_set), usual)
+    def between(recording: RecordingContext, two: RecordingContext, usual: float = 0.0) -> CameraScale | None:
+        return _scale(SegmentDistances.of(recording.all_markers, two.all_markers, marker_set), usual)
 
     def size(scale: CameraScale | None) -> float:
         return np.nan if scale is None else abs(scale.error)
@@ -118,9 +118,11 @@ def trial_scales(context: PersonContext) -> Iterator[Finding]:
         scale = between(first, other)
         if scale is None or not scale.differs:
             continue
-        further: list[tuple[RecordingContext, float]] = [(one, AGAINST_STANDING) for one in context.standing]
-        further += [(one, 0.0) for one in context.trials if one not in (first, other)]
-        witnesses = [(size(between(one, first, usual)), size(between(one, other, usual))) for one, usual in further]
+        further: list[tuple[RecordingContext, float]] = [(standing, AGAINST_STANDING) for standing in context.standing]
+        further += [(trial, 0.0) for trial in context.trials if trial not in (first, other)]
+        witnesses = [
+            (size(between(witness, first, usual)), size(between(witness, other, usual))) for witness, usual in further
+        ]
         for odd in odd_ones(first, other, witnesses):
             peer, sign = (first, 1.0) if odd is other else (other, -1.0)
             yield scale.finding(odd.name, f"trial {peer.name}", sign)
@@ -138,9 +140,9 @@ def _scale(distances: SegmentDistances, usual: float) -> CameraScale | None:
     error = _MEDIAN_ERROR * float(np.median(np.abs(shares - share))) / np.sqrt(markers)
     owners = distances.segments[far]
     off = [np.median(shares[owners == k]) - usual for k in np.unique(owners)]
-    alike = sum(np.sign(one) == np.sign(share - usual) for one in off)
-    several = [one for one, k in zip(off, np.unique(owners), strict=True) if (owners == k).sum() >= _SEVERAL]
-    shown = max((float(one / (share - usual)) for one in several), default=0.0) if share != usual else 0.0
+    alike = sum(np.sign(offset) == np.sign(share - usual) for offset in off)
+    several = [offset for offset, k in zip(off, np.unique(owners), strict=True) if (owners == k).sum() >= _SEVERAL]
+    shown = max((float(offset / (share - usual)) for offset in several), default=0.0) if share != usual else 0.0
     residual_m = rms(after / (1.0 + share - usual) - before)
     return CameraScale(share - usual, float(error), len(shares), int(alike), len(off), shown, residual_m)
 
@@ -148,26 +150,26 @@ def _scale(distances: SegmentDistances, usual: float) -> CameraScale | None:
 @check("S304")
 def interchanged_forces(person: PersonContext) -> Iterator[Finding]:
     """Report S304: two trials whose forces seem to be interchanged, one finding for each."""
-    loaded = [one for one in person.trials if one.trial is not None]
+    loaded = [trial for trial in person.trials if trial.trial is not None]
     for pair in combinations(loaded, 2):
         with_others = [_with_forces_of(a, b) for a, b in (pair, pair[::-1])]
-        kept = [_residual(_over(other, one.velocities)) for one, other in zip(pair, with_others, strict=True)]
-        crossed = [_residual(_over(one.velocities, other)) for one, other in zip(pair, with_others, strict=True)]
+        kept = [_residual(_over(other, trial.velocities)) for trial, other in zip(pair, with_others, strict=True)]
+        crossed = [_residual(_over(trial.velocities, other)) for trial, other in zip(pair, with_others, strict=True)]
         if np.less(crossed, np.multiply(_EACH_BETTER, kept)).all() and sum(crossed) < _BETTER * sum(kept):
-            for k, one in enumerate(pair):
+            for k, trial in enumerate(pair):
                 yield finding(
                     "S304",
-                    Where(trial=one.name),
+                    Where(trial=trial.name),
                     left_own=Quantity(kept[k], "1"),
                     left_crossed=Quantity(crossed[k], "1", limit=_EACH_BETTER * kept[k]),
                     other_trial=Quantity(pair[1 - k].name),
                 )
 
 
-def _with_forces_of(one: RecordingContext, other: RecordingContext) -> list[ForceVelocity]:
-    assert one.trial is not None
+def _with_forces_of(recording: RecordingContext, other: RecordingContext) -> list[ForceVelocity]:
+    assert recording.trial is not None
     assert other.trial is not None
-    return force_velocities(replace(one.trial, loads=other.trial.loads), one.segment_of_label)
+    return force_velocities(replace(recording.trial, loads=other.trial.loads), recording.segment_of_label)
 
 
 def _over(windows: Sequence[ForceVelocity], parts: Sequence[ForceVelocity]) -> Sequence[ForceVelocity]:

@@ -42,10 +42,11 @@ _PHASES = {"stride": "% of the gait cycle", "stance": "% of stance"}
 def change_sentences(found: Sequence[Change]) -> Iterator[str]:
     """Yield a sentence for each outcome that was named beforehand, as a report may state it."""
     for wanted in PRIMARY:
-        for one in found:
-            if (one.quantity, one.joint, one.component, one.event) == wanted:
-                side = f"{SIDES[one.side][0].capitalize()} " if one.side else ""
-                yield f"{side}{one.joint} {one.component} {one.quantity} ({one.event}) {_judgement(one)}."
+        for change in found:
+            if (change.quantity, change.joint, change.component, change.event) == wanted:
+                side = f"{SIDES[change.side][0].capitalize()} " if change.side else ""
+                name = f"{side}{change.joint} {change.component} {change.quantity}"
+                yield f"{name} ({change.event}) {_judgement(change)}."
 
 
 def speed_sentence(speed: Change | None) -> str:
@@ -58,26 +59,26 @@ def speed_sentence(speed: Change | None) -> str:
     return sentence
 
 
-def _judgement(one: Change) -> str:
+def _judgement(change: Change) -> str:
     """State what became of an outcome, as the predicate of a sentence that a clinician may copy."""
-    digits = _DIGITS[one.unit]
-    pair = f"from {one.before:.{digits}f} to {one.after:.{digits}f} {one.unit}"
-    if one.doubt:
+    digits = _DIGITS[change.unit]
+    pair = f"from {change.before:.{digits}f} to {change.after:.{digits}f} {change.unit}"
+    if change.doubt:
         return f"went {pair}; a finding about the instruments keeps this from being judged"
-    if one.verdict == "cannot be judged":
-        return f"went {pair}; {one.strides[0]} and {one.strides[1]} repeats cannot show whether that is a change"
-    if one.verdict == "changed":
-        return f"changed {pair} ({one.difference:+.{digits}f}, SD {one.sd:.{digits}f})"
-    return f"went {pair}; no change is shown, and one below {one.mdc95:.{digits}f} {one.unit} would be missed"
+    if change.verdict == "cannot be judged":
+        return f"went {pair}; {change.strides[0]} and {change.strides[1]} repeats cannot show whether that is a change"
+    if change.verdict == "changed":
+        return f"changed {pair} ({change.difference:+.{digits}f}, SD {change.sd:.{digits}f})"
+    return f"went {pair}; no change is shown, and one below {change.mdc95:.{digits}f} {change.unit} would be missed"
 
 
 def changed_sentence(found: Sequence[Change]) -> str:
     """State how many of the other outcomes changed; by chance some do."""
-    others = [one for one in found if not one.primary and one.verdict != "cannot be judged"]
+    others = [change for change in found if not change.primary and change.verdict != "cannot be judged"]
     if not others:
         return "Nothing else can be judged."
-    count = sum(one.verdict == "changed" for one in others)
-    remain = sum(discovered([one.p for one in others]))
+    count = sum(change.verdict == "changed" for change in others)
+    remain = sum(discovered([change.p for change in others]))
     return (
         f"Of {len(others)} other moments and angles {count} changed; without any change about {0.05 * len(others):.0f} "
         f"would seem to. At a false discovery rate of 5 %, {remain} remain."
@@ -88,7 +89,7 @@ def limit_sentences(found: Sequence[Change], doubt: str) -> Iterator[str]:
     """State what was assumed, and what cannot be judged."""
     if doubt:
         yield f"Changes of moments of the legs concerned cannot be judged: {doubt}"
-    few = sorted({min(one.strides) for one in found if one.assumed})
+    few = sorted({min(change.strides) for change in found if change.assumed})
     if few:
         least = f"{few[0]}" if len(few) == 1 else f"{few[0]} to {few[-1]}"
         strides = "one stride" if least == "1" else f"{least} strides"
@@ -112,17 +113,17 @@ def change_columns(found: Sequence[Change]) -> dict[str, list[Any]]:
     """Return the columns of `changes.csv`: a row per outcome, one column for each part of the standard deviation."""
     names = ("quantity", "joint", "component", "side", "event", "unit", "before", "after", "difference", "sd")
     return {
-        **{name: [getattr(one, name) for one in found] for name in names},
-        **{f"sd_{source}": [one.sd_by_source[source] for one in found] for source in SOURCES},
-        "sd_between_strides_before": [one.stride_sd[0] for one in found],
-        "sd_between_strides_after": [one.stride_sd[1] for one in found],
-        "spread_assumed": [one.assumed for one in found],
-        "walks_needed": [one.walks_needed(RELEVANT[one.unit]) for one in found],
-        "mdc95": [one.mdc95 for one in found],
-        "p": [one.p for one in found],
-        "strides_before": [one.strides[0] for one in found],
-        "strides_after": [one.strides[1] for one in found],
-        "verdict": [one.verdict for one in found],
+        **{name: [getattr(change, name) for change in found] for name in names},
+        **{f"sd_{source}": [change.sd_by_source[source] for change in found] for source in SOURCES},
+        "sd_between_strides_before": [change.stride_sd[0] for change in found],
+        "sd_between_strides_after": [change.stride_sd[1] for change in found],
+        "spread_assumed": [change.assumed for change in found],
+        "walks_needed": [change.walks_needed(RELEVANT[change.unit]) for change in found],
+        "mdc95": [change.mdc95 for change in found],
+        "p": [change.p for change in found],
+        "strides_before": [change.strides[0] for change in found],
+        "strides_after": [change.strides[1] for change in found],
+        "verdict": [change.verdict for change in found],
     }
 
 
@@ -131,104 +132,109 @@ def person_columns(person: str, found: Sequence[Change]) -> dict[str, list[Any]]
     return {
         "person": [person] * len(found),
         **change_columns(found),
-        "remarks": [one.doubt for one in found],
+        "remarks": [change.doubt for change in found],
     }
 
 
 def curve_columns(found: Sequence[CurveChange]) -> dict[str, list[Any]]:
     """Return the columns of `change_curves.csv`: a row per curve and percent, with the simultaneous band."""
-    rows = [(one, k) for one in found for k in range(len(one.before))]
-    bands = {id(one): one.band for one in found}
+    rows = [(curve, k) for curve in found for k in range(len(curve.before))]
+    bands = {id(curve): curve.band for curve in found}
     names = ("quantity", "joint", "component", "side", "phase", "unit")
     curves = ("before", "after", "before_sd", "after_sd", "difference", "sd")
     return {
-        **{name: [getattr(one, name) for one, _ in rows] for name in names},
+        **{name: [getattr(curve, name) for curve, _ in rows] for name in names},
         "percent": [k for _, k in rows],
-        **{name: np.concatenate([getattr(one, name) for one in found]).tolist() if found else [] for name in curves},
-        **{end: [float(bands[id(one)][j][k]) for one, k in rows] for j, end in enumerate(("lower", "upper"))},
+        **{
+            name: np.concatenate([getattr(curve, name) for curve in found]).tolist() if found else [] for name in curves
+        },
+        **{end: [float(bands[id(curve)][j][k]) for curve, k in rows] for j, end in enumerate(("lower", "upper"))},
     }
 
 
 def change_rows(found: Sequence[Change]) -> list[dict[str, Any]]:
     """Return the rows of the page's table: numbers with their text, primary outcomes first."""
-    order = sorted(found, key=lambda one: (not one.primary, one.quantity != "moment"))
+    order = sorted(found, key=lambda change: (not change.primary, change.quantity != "moment"))
     return [
         {
-            "outcome": outcome_words(one),
-            "side": SIDES[one.side][0] if one.side else "",
-            "event": one.event,
-            "unit": one.unit,
-            "verdict": one.verdict,
-            "primary": one.primary,
-            "needed": one.walks_needed(RELEVANT[one.unit]) or f"over {MOST_WALKS}",
-            "cells": [_cell(one, value) for value in (one.before, one.after)]
-            + [_cell(one, one.difference, "+")]
-            + [_cell(one, value) for value in (one.mdc95, one.sd, *(one.sd_by_source[source] for source in SOURCES))],
+            "outcome": outcome_words(change),
+            "side": SIDES[change.side][0] if change.side else "",
+            "event": change.event,
+            "unit": change.unit,
+            "verdict": change.verdict,
+            "primary": change.primary,
+            "needed": change.walks_needed(RELEVANT[change.unit]) or f"over {MOST_WALKS}",
+            "cells": [_cell(change, value) for value in (change.before, change.after)]
+            + [_cell(change, change.difference, "+")]
+            + [
+                _cell(change, value)
+                for value in (change.mdc95, change.sd, *(change.sd_by_source[source] for source in SOURCES))
+            ],
         }
-        for one in order
+        for change in order
     ]
 
 
 def group_columns(found: Sequence[GroupChange]) -> dict[str, list[Any]]:
     """Return the columns of `change_means.csv`: a row per outcome."""
-    return {each.name: [getattr(one, each.name) for one in found] for each in fields(GroupChange)}
+    return {column.name: [getattr(change, column.name) for change in found] for column in fields(GroupChange)}
 
 
 def group_rows(found: Sequence[GroupChange]) -> list[tuple[str, ...]]:
     """Return rows of text: speed, steps and the primary outcomes."""
-    chosen = [one for one in found if one.quantity == "gait" or one.primary]
-    return [_group_row(one) for one in chosen]
+    chosen = [change for change in found if change.quantity == "gait" or change.primary]
+    return [_group_row(change) for change in chosen]
 
 
-def _group_row(one: GroupChange) -> tuple[str, ...]:
-    side = f"{SIDES[one.side][0]} " if one.side else ""
-    event = f", {one.event}" if one.event else ""
-    digits = _DIGITS[one.unit]
-    known = one.people > 1
+def _group_row(change: GroupChange) -> tuple[str, ...]:
+    side = f"{SIDES[change.side][0]} " if change.side else ""
+    event = f", {change.event}" if change.event else ""
+    digits = _DIGITS[change.unit]
+    known = change.people > 1
     return (
-        f"{side}{outcome_words(one)}{event}",
-        one.unit,
-        str(one.people),
-        f"{one.before:.{digits}f}",
-        f"{one.after:.{digits}f}",
-        f"{one.difference:+.{digits}f}",
-        f"{one.lower:+.{digits}f} to {one.upper:+.{digits}f}" if known else "",
-        f"{one.sd:.{digits}f}" if known else "",
-        str(one.changed),
+        f"{side}{outcome_words(change)}{event}",
+        change.unit,
+        str(change.people),
+        f"{change.before:.{digits}f}",
+        f"{change.after:.{digits}f}",
+        f"{change.difference:+.{digits}f}",
+        f"{change.lower:+.{digits}f} to {change.upper:+.{digits}f}" if known else "",
+        f"{change.sd:.{digits}f}" if known else "",
+        str(change.changed),
     )
 
 
-def outcome_words(one: Change | CurveChange | GroupChange) -> str:
+def outcome_words(outcome: Change | CurveChange | GroupChange) -> str:
     """Return what a change is of: "knee adduction moment", "walking speed"."""
-    quantity = "" if one.quantity == "gait" else f" {one.quantity}"
-    return f"{one.joint} {one.component}{quantity}".replace("_", " ")
+    quantity = "" if outcome.quantity == "gait" else f" {outcome.quantity}"
+    return f"{outcome.joint} {outcome.component}{quantity}".replace("_", " ")
 
 
-def _cell(one: Change, value: float, sign: str = "") -> dict[str, Any]:
+def _cell(change: Change, value: float, sign: str = "") -> dict[str, Any]:
     known = bool(np.isfinite(value))
-    return {"value": value if known else 0.0, "text": f"{value:{sign}.{_DIGITS[one.unit]}f}" if known else "–"}
+    return {"value": value if known else 0.0, "text": f"{value:{sign}.{_DIGITS[change.unit]}f}" if known else "–"}
 
 
 def changes_summary(
     before: str, after: str, found: Sequence[Change], speed: Change | None, gait: Sequence[Change]
 ) -> dict[str, Any]:
     """Return what `kinertia compare --json` prints of changes."""
-    rows = [_summary(one) for one in found]
+    rows = [_summary(change) for change in found]
     return {
         "before": before,
         "after": after,
         "walking_speed": None if speed is None else _summary(speed),
-        "spatiotemporal": [_summary(one) for one in gait],
+        "spatiotemporal": [_summary(change) for change in gait],
         "outcomes": rows,
     }
 
 
-def _summary(one: Change) -> dict[str, Any]:
+def _summary(change: Change) -> dict[str, Any]:
     return {
-        **asdict(one),
-        "difference": one.difference,
-        "verdict": one.verdict,
-        "walks_needed": one.walks_needed(RELEVANT[one.unit]),
+        **asdict(change),
+        "difference": change.difference,
+        "verdict": change.verdict,
+        "walks_needed": change.walks_needed(RELEVANT[change.unit]),
     }
 
 
@@ -237,10 +243,10 @@ def curve_figures(curves: Sequence[CurveChange], before: str, after: str) -> lis
     result = []
     for quantity, joints in _JOINTS.items():
         for joint in joints:
-            own = [one for one in curves if (one.quantity, one.joint) == (quantity, joint)]
-            if own:
+            chosen = [curve for curve in curves if (curve.quantity, curve.joint) == (quantity, joint)]
+            if chosen:
                 title = f"{joint.capitalize()} {quantity}s"
-                drawn = joint_figure(own, title, before, after)
+                drawn = joint_figure(chosen, title, before, after)
                 result.append({"id": f"change-{joint}-{quantity}", "title": title, "figure": written(drawn)})
     return result
 
@@ -249,12 +255,12 @@ def joint_figure(curves: Sequence[CurveChange], title: str, before: str, after: 
     """Draw the curves of one joint, side by side, and their differences below."""
     panels: list[Panel] = []
     for side in ("r", "l", ""):
-        own = [one for one in curves if one.side == side]
-        panels += [_both(one, before, after) for one in own]
-        panels += [_difference(one) for one in own]
+        of_side = [curve for curve in curves if curve.side == side]
+        panels += [_both(curve, before, after) for curve in of_side]
+        panels += [_difference(curve) for curve in of_side]
     axis: dict[str, Any] = {"range": [0, 100], "tickvals": [0, 20, 40, 60, 80, 100]}
     axis["title"] = {
-        "text": " or ".join(dict.fromkeys(_PHASES[one.phase] for one in curves)),
+        "text": " or ".join(dict.fromkeys(_PHASES[curve.phase] for curve in curves)),
         "font": {"size": 11},
         "standoff": 2,
     }
@@ -262,34 +268,34 @@ def joint_figure(curves: Sequence[CurveChange], title: str, before: str, after: 
     return small_multiples(panels, alt, axis)
 
 
-def _both(one: CurveChange, before: str, after: str) -> Panel:
+def _both(curve: CurveChange, before: str, after: str) -> Panel:
     traces: list[dict[str, Any]] = []
     for name, mean, sd, colour in (
-        (before, one.before, one.before_sd, COMPARED[0]),
-        (after, one.after, one.after_sd, COMPARED[1]),
+        (before, curve.before, curve.before_sd, COMPARED[0]),
+        (after, curve.after, curve.after_sd, COMPARED[1]),
     ):
         traces.append(band(mean - INTERVAL_SD * sd, mean + INTERVAL_SD * sd, faded(colour, _OPACITY)))
         traces.append({**mean_line(mean), "name": plain(name), "line": {"color": colour, "width": 2}})
-    return Panel(f"{_words(one)} ({one.unit})", traces)
+    return Panel(f"{_words(curve)} ({curve.unit})", traces)
 
 
-def _difference(one: CurveChange) -> Panel:
-    low, high = one.band
+def _difference(curve: CurveChange) -> Panel:
+    low, high = curve.band
     traces: list[dict[str, Any]] = []
-    if np.isfinite(one.factor):
+    if np.isfinite(curve.factor):
         traces.append(band(low, high, faded(GREY, _OPACITY)))
-    traces.append({**mean_line(one.difference), "name": "difference", "line": {"color": GREY, "width": 2}})
-    return Panel(f"Difference: {_words(one)}", traces, shapes=list(_shown(one)))
+    traces.append({**mean_line(curve.difference), "name": "difference", "line": {"color": GREY, "width": 2}})
+    return Panel(f"Difference: {_words(curve)}", traces, shapes=list(_shown(curve)))
 
 
-def _shown(one: CurveChange) -> Iterator[dict[str, Any]]:
+def _shown(curve: CurveChange) -> Iterator[dict[str, Any]]:
     """Shade where the band leaves out zero."""
-    for first, last in runs(one.changed):
+    for first, last in runs(curve.changed):
         yield shaded(float(first), float(last), faded(GREEN, _SHADE))
 
 
-def _words(one: CurveChange) -> str:
-    side = f"{SIDES[one.side][0]} " if one.side else ""
-    during = ", stance" if one.phase == "stance" else ""
-    text = f"{side}{one.joint} {one.component}{during}".replace("_", " ")
+def _words(curve: CurveChange) -> str:
+    side = f"{SIDES[curve.side][0]} " if curve.side else ""
+    during = ", stance" if curve.phase == "stance" else ""
+    text = f"{side}{curve.joint} {curve.component}{during}".replace("_", " ")
     return text[0].upper() + text[1:]

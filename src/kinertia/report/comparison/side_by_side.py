@@ -83,16 +83,20 @@ def differences(first: Fit, other: Fit) -> list[Difference]:
 
 def judged(compared: Sequence[Difference]) -> list[Difference]:
     """Return the differences that have error bars to test a change by."""
-    return [one for one in compared if one.changed is not None]
+    return [difference for difference in compared if difference.changed is not None]
 
 
 def outcome_of(compared: Sequence[Difference]) -> str:
     """State in words how many parameters changed."""
     distinguished = judged(compared)
     if not distinguished:
-        without = "no error bars" if any(one.same for one in compared) else "no segment is the same in both models"
+        without = (
+            "no error bars"
+            if any(difference.same for difference in compared)
+            else "no segment is the same in both models"
+        )
         return f"{without}, differences only"
-    changed = sum(bool(one.changed) for one in distinguished)
+    changed = sum(bool(difference.changed) for difference in distinguished)
     their = "their" if changed else "its"
     counted = f"{changed or 'none'} of {len(distinguished)} body segment parameters"
     return f"{counted} changed beyond {their} error bars"
@@ -114,7 +118,9 @@ def remarks(fits: Mapping[str, Fit]) -> list[str]:
         lacking = sorted(set(first.estimate.segments) ^ set(other.estimate.segments))
         if lacking:
             notes.append(f"{name} and {other_name} do not share these segments: {', '.join(lacking)}")
-        if unlike := sorted({segment_name(one.segment) for one in differences(first, other) if not one.same}):
+        if unlike := sorted(
+            {segment_name(difference.segment) for difference in differences(first, other) if not difference.same}
+        ):
             notes.append(
                 f"{name} and {other_name} use different models: {', '.join(unlike)} differ in origin and extent (other "
                 "joints or neighbours), so their parameters cannot be compared"
@@ -122,7 +128,7 @@ def remarks(fits: Mapping[str, Fit]) -> list[str]:
         notes += [
             sentence for joint in _MOMENTS if (sentence := _sign_remark(joint, (name, first), (other_name, other)))
         ]
-    without = [one for one, fit in fits.items() if fit.posterior is None]
+    without = [result for result, fit in fits.items() if fit.posterior is None]
     if without:
         subjects = f"{name}, the reference of the comparison" if name in without else ", ".join(without)
         notes.append(
@@ -135,7 +141,7 @@ def _sign_remark(joint: str, first: tuple[str, Fit], other: tuple[str, Fit]) -> 
     """Explain how a moment of the other result is drawn, where the models define it differently."""
     (name, fit), (other_name, other_fit) = first, other
     both = [f"{joint}_{side}" for side in FEET]
-    if not all(set(both) & set(one.skeleton.coordinates) for one in (fit, other_fit)):
+    if not all(set(both) & set(compared.skeleton.coordinates) for compared in (fit, other_fit)):
         return ""
     signs = {same_sign(joint, side, fit.skeleton, other_fit.skeleton) for side in FEET}
     if -1 in signs:
@@ -150,14 +156,14 @@ def _sign_remark(joint: str, first: tuple[str, Fit], other: tuple[str, Fit]) -> 
 def comparison_columns(fits: Mapping[str, Fit]) -> dict[str, list[Any]]:
     """Return the table of `compare.csv`: a row per other result, segment and parameter."""
     (name, first), *others = fits.items()
-    rows = [(name, other_name, one) for other_name, other in others for one in differences(first, other)]
+    rows = [(name, other_name, difference) for other_name, other in others for difference in differences(first, other)]
     return {
         "first": [row[0] for row in rows],
         "other": [row[1] for row in rows],
-        **{key: [getattr(one, key) for *_, one in rows] for key in ("segment", "parameter", "unit")},
-        "first_value": [one.first for *_, one in rows],
-        "other_value": [one.other for *_, one in rows],
-        **{key: [getattr(one, key) for *_, one in rows] for key in ("change", "sd", "changed")},
+        **{key: [getattr(difference, key) for *_, difference in rows] for key in ("segment", "parameter", "unit")},
+        "first_value": [difference.first for *_, difference in rows],
+        "other_value": [difference.other for *_, difference in rows],
+        **{key: [getattr(difference, key) for *_, difference in rows] for key in ("change", "sd", "changed")},
     }
 
 
@@ -169,7 +175,10 @@ def comparison_summary(fits: Mapping[str, Fit]) -> dict[str, Any]:
         "remarks": remarks(fits),
         "file_outputs": {name: outputs_summary(fit) for name, fit in fits.items()},
         "against_first": {
-            name: [{**asdict(one), "change": one.change, "changed": one.changed} for one in differences(first, other)]
+            name: [
+                {**asdict(difference), "change": difference.change, "changed": difference.changed}
+                for difference in differences(first, other)
+            ]
             for name, other in others
         },
     }
@@ -192,26 +201,26 @@ def render_comparison(fits: Mapping[str, Fit], changes: Mapping[str, Any] | None
         first=name,
         changes=changes,
         not_compared=not_compared,
-        results=[_head(one, fit) for one, fit in fits.items()],
+        results=[_head(result, fit) for result, fit in fits.items()],
         remarks=remarks(fits),
         judged=any(judged(compared) for _, compared in pairs),
         pairs=[
             {
                 "name": other,
                 "outcome": outcome_of(compared),
-                "changed": any(one.changed for one in compared),
+                "changed": any(difference.changed for difference in compared),
                 "judged": bool(judged(compared)),
-                "rows": [_row(one) for one in compared],
+                "rows": [_row(difference) for difference in compared],
             }
             for other, compared in pairs
         ],
-        strides={one: stride_rows(fit) for one, fit in fits.items() if _strides(fit)},
+        strides={result: stride_rows(fit) for result, fit in fits.items() if _strides(fit)},
         measures=[row.measure for row in next((stride_rows(fit) for fit in fits.values() if _strides(fit)), [])],
         figure=None if figure is None else written(figure),
         beside=[
-            {**one, "name": f"{result}, {one['name']}"}
+            {**output, "name": f"{result}, {output['name']}"}
             for result, fit in fits.items()
-            for one in outputs_view(fit, fit.trials[:_MOST_TRIALS], MOST_FRAMES // _MOST_TRIALS)
+            for output in outputs_view(fit, fit.trials[:_MOST_TRIALS], MOST_FRAMES // _MOST_TRIALS)
         ],
         sd=CHANGED_SD,
     )
@@ -233,20 +242,22 @@ def _head(name: str, fit: Fit) -> dict[str, Any]:
     }
 
 
-def _row(one: Difference) -> dict[str, Any]:
-    k = PARAMETERS.index(one.parameter)
+def _row(difference: Difference) -> dict[str, Any]:
+    k = PARAMETERS.index(difference.parameter)
     unit, factor = read_in(k)
-    digits = decimals(k, one.sd if one.sd > 0 else 0.1 * max(abs(one.first), abs(one.other)))
-    numbers = {"first": one.first, "other": one.other, "change": one.change, "sd": one.sd}
+    digits = decimals(
+        k, difference.sd if difference.sd > 0 else 0.1 * max(abs(difference.first), abs(difference.other))
+    )
+    numbers = {"first": difference.first, "other": difference.other, "change": difference.change, "sd": difference.sd}
     cells = {
         key: {"value": value * factor, "text": fixed(value * factor, digits, sign=key == "change")}
         for key, value in numbers.items()
         if np.isfinite(value)
     }
     return {
-        "segment": segment_name(one.segment),
+        "segment": segment_name(difference.segment),
         "parameter": f"{NAMES[k]} ({unit})",
-        "changed": one.changed,
+        "changed": difference.changed,
         **cells,
     }
 
@@ -260,14 +271,18 @@ def moments_figure(fits: Mapping[str, Fit]) -> Figure | None:
         return None
     curves = {name: estimated_curves(fit) for name, fit in walked.items()}
     first = next(iter(fits.values())).skeleton
-    titles = {one.name: load_title(one, "moment") for one in panels_of(first) if one.name in _MOMENTS}
+    titles = {
+        coordinate.name: load_title(coordinate, "moment")
+        for coordinate in panels_of(first)
+        if coordinate.name in _MOMENTS
+    }
     panels = []
     for joint, title in titles.items():
         for side in FEET:
             traces = [
                 {**mean_line(sign * mean_curve(own_curves)), "name": plain(name), "line": {"color": colour, "width": 2}}
-                for (name, own), colour in zip(curves.items(), _COLOURS, strict=False)
-                if (own_curves := own.get((f"{joint}_moment", side)))
+                for (name, shown), colour in zip(curves.items(), _COLOURS, strict=False)
+                if (own_curves := shown.get((f"{joint}_moment", side)))
                 and (sign := same_sign(joint, side, first, walked[name].skeleton))
             ]
             if traces:

@@ -144,7 +144,7 @@ class GroupComparison:
         """One row per person and outcome, walking speed and steps first: for mixed models."""
         import pandas as pd
 
-        tables = (person_columns(name, (*one.steps, *one.outcomes)) for name, one in self.people.items())
+        tables = (person_columns(name, (*person.steps, *person.outcomes)) for name, person in self.people.items())
         return pd.concat([pd.DataFrame(columns) for columns in tables], ignore_index=True)
 
     @property
@@ -152,7 +152,7 @@ class GroupComparison:
         """One row per outcome: mean change with its 95 % interval, and how differently people changed."""
         import pandas as pd
 
-        every = {name: (*one.steps, *one.outcomes) for name, one in self.people.items()}
+        every = {name: (*person.steps, *person.outcomes) for name, person in self.people.items()}
         return pd.DataFrame(group_columns(group_changes(every)))
 
 
@@ -253,7 +253,10 @@ def _comparison(
     """Add speed, steps and doubts about instruments."""
     doubts = instrument_doubts((first.fit, first.trials), (other.fit, other.trials))
     doubt = " ".join(dict.fromkeys(doubts.values()))
-    judged = tuple(replace(one, doubt=doubts.get(one.side, "") if one.quantity == "moment" else "") for one in outcomes)
+    judged = tuple(
+        replace(outcome, doubt=doubts.get(outcome.side, "") if outcome.quantity == "moment" else "")
+        for outcome in outcomes
+    )
     walks = first.trials, other.trials
     gait = gait_changes(*walks) + (() if norms is None else _profiles(first, other, read_norms(norms)))
     return Comparison(*names, judged, speed_change(*walks), gait, tuple(curves), doubt)
@@ -261,8 +264,8 @@ def _comparison(
 
 def _profiles(first: Session, other: Session, norms: Mapping[str, Norm]) -> tuple[Change, ...]:
     expect_all_nine(norms)
-    for one in (first, other):
-        check_convention(one.fit, norms)
+    for side in (first, other):
+        check_convention(side.fit, norms)
     return profile_changes(first.trials, other.trials, norms)
 
 
@@ -279,39 +282,42 @@ def instrument_doubts(before: tuple[Fit, Trials], after: tuple[Fit, Trials]) -> 
     Args:
         before, after: fit and trials of each condition; of one session, the same fit.
     """
-    own = [_findings(*each) for each in (before, after)]
+    by_side = [_findings(*compared) for compared in (before, after)]
     if before[0] is after[0]:
-        everywhere = {_kind(one) for one in own[0]} & {_kind(one) for one in own[1]}
-        own = [[one for one in some if one.severity is Severity.ERROR or _kind(one) not in everywhere] for some in own]
+        everywhere = {_kind(finding) for finding in by_side[0]} & {_kind(finding) for finding in by_side[1]}
+        by_side = [
+            [finding for finding in some if finding.severity is Severity.ERROR or _kind(finding) not in everywhere]
+            for some in by_side
+        ]
     doubts: dict[str, dict[str, str]] = {}
-    for one in (*own[0], *own[1]):
-        for side in _sides(one):
-            doubts.setdefault(side, {})[one.code] = f"{one.code}: {one.message}"
+    for finding in (*by_side[0], *by_side[1]):
+        for side in _sides(finding):
+            doubts.setdefault(side, {})[finding.code] = f"{finding.code}: {finding.message}"
     return {side: " ".join(said.values()) for side, said in doubts.items()}
 
 
-def _sides(one: Finding) -> tuple[str, ...]:
+def _sides(finding: Finding) -> tuple[str, ...]:
     """Return the sides whose loads a finding is about: that of a foot which it names, or all."""
-    foot = one.evidence.get("foot")
+    foot = finding.evidence.get("foot")
     return {"right": ("r",), "left": ("l",)}.get("" if foot is None else str(foot.value), ("r", "l", ""))
 
 
 def _findings(fit: Fit, trials: Trials) -> list[Finding]:
     names = {trial.name for trial in trials}
     return [
-        one
-        for one in fit.findings
-        if one.code.startswith(_INSTRUMENTS)
-        and one.severity >= Severity.WARNING
-        and one.code not in _LEFT_OUT | _MILD
-        and one.muted_by is None
-        and one.status != "ignored"
-        and one.where.trial in (None, *names)
+        finding
+        for finding in fit.findings
+        if finding.code.startswith(_INSTRUMENTS)
+        and finding.severity >= Severity.WARNING
+        and finding.code not in _LEFT_OUT | _MILD
+        and finding.muted_by is None
+        and finding.status != "ignored"
+        and finding.where.trial in (None, *names)
     ]
 
 
-def _kind(one: Finding) -> tuple[str, str | None, str | None]:
-    return one.code, one.where.plate, one.where.axis
+def _kind(finding: Finding) -> tuple[str, str | None, str | None]:
+    return finding.code, finding.where.plate, finding.where.axis
 
 
 def fit_session(subject: Path | SubjectFile, progress: Progress = lambda stage, share: None) -> Fit:

@@ -55,7 +55,9 @@ def write_c3d_results(
         FileError: a trial's file is not found, has changed, or cannot take results.
     """
     fit, provenance = saved.fit, saved.provenance
-    chosen = next((one for one in CONVENTIONS if one == convention), usual_convention(fit))
+    chosen = next(
+        (known_convention for known_convention in CONVENTIONS if known_convention == convention), usual_convention(fit)
+    )
     for trial in fit.trials:
         path = trial_file(provenance, trial.name, results, recordings)
         source = path if path.suffix.lower() == ".c3d" else read_recording(path)
@@ -68,7 +70,7 @@ def usual_convention(fit: Fit) -> Convention:
     """Return Plug-in Gait's convention where its markers are present, else ISB's."""
     prefix = shared_prefix(fit.skeleton.labels)
     labels = {label.removeprefix(prefix) for label in fit.skeleton.labels}
-    return "plug-in-gait" if any(own <= labels for own in _PLUG_IN_GAIT) else "isb"
+    return "plug-in-gait" if any(needed <= labels for needed in _PLUG_IN_GAIT) else "isb"
 
 
 def new_file(recording: Recording, folder: Path) -> Path:
@@ -105,14 +107,14 @@ def c3d_with_results(
         raise FileError(source, f"cannot take results of the model {fit.skeleton.name}: its {legs}")
     points = [*_points(outputs, frames, at, UNITS[convention]), *_centres(source, frames, trial, prefix, at)]
     taken = set(frames.labels)
-    if any(prefix + one.label in taken for one in points):
-        points = [replace(one, label=_suffixed(one.label)) for one in points]
+    if any(prefix + point.label in taken for point in points):
+        points = [replace(point, label=_suffixed(point.label)) for point in points]
     units = {kind: frames.units.get(kind, unit) for kind, unit in UNITS[convention].items()}
     known = found_events(trial.skeleton, trial.kinematics)
-    events = [EventToWrite(one.event, one.source) for one in known if one.source != "file"]
+    events = [EventToWrite(event.event, event.source) for event in known if event.source != "file"]
     try:
-        own, measures = _own(fit, convention, files, units), _stride_measures(trial)
-        return with_outputs(frames, points, prefix, units, own, events, measures)
+        parameters, measures = _own(fit, convention, files, units), _stride_measures(trial)
+        return with_outputs(frames, points, prefix, units, parameters, events, measures)
     except TooManyParameters:
         raise too_many(source) from None
 
@@ -128,9 +130,9 @@ def prefix_of(frames: C3dFrames, trial: TrialFit) -> str:
     """
     labels = set(frames.labels)
     every = trial.kinematics.trial.markers.labels
-    own = [label for label in every if ":" not in label] or every
+    unprefixed = [label for label in every if ":" not in label] or every
     prefixes = dict.fromkeys(["", *(label.split(":", 1)[0] + ":" for label in frames.labels if ":" in label)])
-    return max(prefixes, key=lambda prefix: sum(prefix + label in labels for label in own))
+    return max(prefixes, key=lambda prefix: sum(prefix + label in labels for label in unprefixed))
 
 
 def _frames_at(source: Path, frames: C3dFrames, trial: TrialFit) -> np.ndarray:
@@ -151,16 +153,16 @@ def _points(
 ) -> list[OutputPoint]:
     """Return outputs and their SDs at all frames of the file, in the file's units where it states others."""
     points, count = [], len(frames.points)
-    for one in outputs:
-        own = unit_factor(one.kind, units[one.kind])
-        stated = unit_factor(one.kind, frames.units.get(one.kind, units[one.kind]))
-        assert own is not None
+    for output in outputs:
+        written_factor = unit_factor(output.kind, units[output.kind])
+        stated = unit_factor(output.kind, frames.units.get(output.kind, units[output.kind]))
+        assert written_factor is not None
         assert stated is not None  # `frames_of` refuses others
-        factor = own / stated
-        points.append(OutputPoint(one.name, one.kind, _spread(factor * one.values, at, count)))
-        if np.isfinite(one.sd).any():
-            sd = np.where(np.isfinite(one.sd), factor * one.sd, NO_DEVIATION)
-            points.append(OutputPoint(one.name + SD, one.kind, _spread(sd, at, count), "SD; -1: none"))
+        factor = written_factor / stated
+        points.append(OutputPoint(output.name, output.kind, _spread(factor * output.values, at, count)))
+        if np.isfinite(output.sd).any():
+            sd = np.where(np.isfinite(output.sd), factor * output.sd, NO_DEVIATION)
+            points.append(OutputPoint(output.name + SD, output.kind, _spread(sd, at, count), "SD; -1: none"))
     return points
 
 
@@ -217,7 +219,7 @@ def _own(
     bsp, table = fit.estimate, fit.estimate.table()
     coms = [PARAMETERS.index(name) for name in ("com_x", "com_y", "com_z")]
     count = len(bsp.segments)
-    own: dict[str, tuple[Value, tuple[int, ...] | None]] = {
+    parameters: dict[str, tuple[Value, tuple[int, ...] | None]] = {
         "VERSION": ([VERSION], None),
         "CONVENTION": ([convention], None),
         "UNITS": ([f"{kind} {unit}{'' if kind == 'ANGLES' else '/kg'}" for kind, unit in units.items()], None),
@@ -227,11 +229,11 @@ def _own(
         "COM": (table[:, coms], (3, count)),
     }
     if fit.posterior is not None:
-        own["MASS_SD"] = (fit.posterior.sd[:, PARAMETERS.index("mass")], None)
-        own["COM_SD"] = (fit.posterior.sd[:, coms], (3, count))
+        parameters["MASS_SD"] = (fit.posterior.sd[:, PARAMETERS.index("mass")], None)
+        parameters["COM_SD"] = (fit.posterior.sd[:, coms], (3, count))
     if files:
-        own["FILES"], own["SHA256"] = (list(files), None), (list(files.values()), None)
-    return own
+        parameters["FILES"], parameters["SHA256"] = (list(files), None), (list(files.values()), None)
+    return parameters
 
 
 def _stride_measures(trial: TrialFit) -> list[Measure]:
@@ -240,34 +242,34 @@ def _stride_measures(trial: TrialFit) -> list[Measure]:
         return []
     feet = feet_under_pelvis(trial.skeleton, trial.kinematics)
     found = [
-        (stride.side, _measures(stride, one))
-        for stride, one in zip(
+        (stride.side, _measures(stride, measured))
+        for stride, measured in zip(
             trial.strides, spatiotemporal(feet, trial.strides, trial.kinematics.trial.belt), strict=True
         )
     ]
     result = []
     for side in FEET:
-        own = [measures for of, measures in found if of == side]
-        for name, unit in own[0] if own else ():
-            values = np.array([measures[name, unit] for measures in own])
+        of_side = [measures for measured_side, measures in found if measured_side == side]
+        for name, unit in of_side[0] if of_side else ():
+            values = np.array([measures[name, unit] for measures in of_side])
             if np.isfinite(values).any():
                 result.append(Measure(_CONTEXTS[side], name, unit, float(np.nanmean(values))))
     return result
 
 
-def _measures(stride: Stride, one: Spatiotemporal) -> dict[tuple[str, str], float]:
+def _measures(stride: Stride, measured: Spatiotemporal) -> dict[tuple[str, str], float]:
     """Return the measures by name and unit."""
     return {
-        ("Cadence", "steps/min"): one.cadence_steps_min,
-        ("Walking Speed", "m/s"): one.speed_m_s,
-        ("Stride Time", "s"): one.stride_time_s,
-        ("Step Time", "s"): one.step_time_s,
+        ("Cadence", "steps/min"): measured.cadence_steps_min,
+        ("Walking Speed", "m/s"): measured.speed_m_s,
+        ("Stride Time", "s"): measured.stride_time_s,
+        ("Step Time", "s"): measured.step_time_s,
         ("Opposite Foot Off", "%"): stride.percent(stride.opposite_toe_off_s),
         ("Opposite Foot Contact", "%"): stride.percent(stride.opposite_strike_s),
         ("Foot Off", "%"): stride.percent(stride.toe_off_s),
         ("Single Support", "s"): stride.opposite_strike_s - stride.opposite_toe_off_s,
-        ("Double Support", "s"): 0.01 * one.double_support_percent * one.stride_time_s,
-        ("Stride Length", "m"): one.stride_length_m,
-        ("Step Length", "m"): one.step_length_m,
-        ("Step Width", "m"): one.step_width_m,
+        ("Double Support", "s"): 0.01 * measured.double_support_percent * measured.stride_time_s,
+        ("Stride Length", "m"): measured.stride_length_m,
+        ("Step Length", "m"): measured.step_length_m,
+        ("Step Width", "m"): measured.step_width_m,
     }

@@ -41,16 +41,16 @@ def draw_dataset(fit: Fit, count: int, seed: int) -> Dataset:
     xarray = _xarray()
     drawn = [drawn_fit(fit, number) for number in chosen_draws(fit, count, seed)]
     times, sample = _times(fit.trials), ("chain", "draw")
-    names = {kind: own for kind in _OVER_TIME if (own := _names(fit, kind))}
+    names = {kind: shown for kind in _OVER_TIME if (shown := _names(fit, kind))}
     variables: dict[str, Any] = {}
-    for kind, own in names.items():
-        values = np.full((1, count, len(fit.trials), len(times), len(own)), np.nan)
-        for n, one in enumerate(drawn):
-            for k, trial in enumerate(one.trials):
+    for kind, shown in names.items():
+        values = np.full((1, count, len(fit.trials), len(times), len(shown)), np.nan)
+        for n, draw in enumerate(drawn):
+            for k, trial in enumerate(draw.trials):
                 curves = _over_own_time(trial, kind)
                 values[0, n, k, _rows(curves.time, times)] = curves.values
         variables[kind] = (*sample, "trial", "time", _DRAWN_ALONG[kind]), values, {"units": _OVER_TIME[kind]}
-    tables = np.array([one.estimate.table() for one in drawn])[None]
+    tables = np.array([draw.estimate.table() for draw in drawn])[None]
     by_parameter = "kg (mass), m (com), kg m2 (inertia)"
     variables["bsp"] = ((*sample, "segment", "parameter"), tables, {"units": by_parameter})
     coordinates = {
@@ -58,7 +58,7 @@ def draw_dataset(fit: Fit, count: int, seed: int) -> Dataset:
         "draw": np.arange(count),
         "trial": [trial.name for trial in fit.trials],
         "time": ("time", times, {"units": "s"}),
-        **{_DRAWN_ALONG[kind]: own for kind, own in names.items()},
+        **{_DRAWN_ALONG[kind]: shown for kind, shown in names.items()},
         "segment": list(fit.estimate.segments),
         "parameter": list(PARAMETERS),
     }
@@ -67,18 +67,18 @@ def draw_dataset(fit: Fit, count: int, seed: int) -> Dataset:
 
 def _over_percent(fit: Fit, kind: str) -> tuple[dict[str, Any], np.ndarray, np.ndarray]:
     """Return coordinates, values and SDs by trial, side, stride, percent and joint."""
-    curves = [one for trial in fit.trials for one in cycle_curves(trial, fit.mass_kg) if one.kind == kind]
+    curves = [curve for trial in fit.trials for curve in cycle_curves(trial, fit.mass_kg) if curve.kind == kind]
     if not curves:
         raise KinertiaError('there are no strides, and no curves over the gait cycle: ask for over="time"')
     trials = [trial.name for trial in fit.trials]
-    strides = list(range(1, 1 + max(one.stride.number for one in curves)))
-    joints = list(dict.fromkeys(one.quantity.removesuffix(f"_{kind}") for one in curves))
+    strides = list(range(1, 1 + max(curve.stride.number for curve in curves)))
+    joints = list(dict.fromkeys(curve.quantity.removesuffix(f"_{kind}") for curve in curves))
     percent = np.arange(len(curves[0].value))
     value, sd = np.full((2, len(trials), len(FEET), len(strides), len(percent), len(joints)), np.nan)
-    for one in curves:
-        joint = joints.index(one.quantity.removesuffix(f"_{kind}"))
-        at = trials.index(one.trial), FEET.index(one.stride.side), one.stride.number - 1, slice(None), joint
-        value[at], sd[at] = one.value, one.sd
+    for curve in curves:
+        joint = joints.index(curve.quantity.removesuffix(f"_{kind}"))
+        at = trials.index(curve.trial), FEET.index(curve.stride.side), curve.stride.number - 1, slice(None), joint
+        value[at], sd[at] = curve.value, curve.sd
     along = {"percent": ("percent", percent, {"units": "% of the gait cycle"})}
     return {"trial": trials, "side": list(FEET), "stride": strides, **along, "joint": joints}, value, sd
 
@@ -90,11 +90,11 @@ def _over_time(fit: Fit, kind: str) -> tuple[dict[str, Any], np.ndarray, np.ndar
         raise KinertiaError(f"no curves of {kind!r}: the two-level method and older results have none")
     value, sd = np.full((2, len(fit.trials), len(times), len(names)), np.nan)
     for k, trial in enumerate(fit.trials):
-        own = _over_own_time(trial, kind)
-        rows = _rows(own.time, times)
-        value[k, rows] = own.values
-        if own.sd is not None:
-            sd[k, rows] = own.sd
+        curve = _over_own_time(trial, kind)
+        rows = _rows(curve.time, times)
+        value[k, rows] = curve.values
+        if curve.sd is not None:
+            sd[k, rows] = curve.sd
     along = {"time": ("time", times, {"units": "s"})}
     return {"trial": [trial.name for trial in fit.trials], **along, "joint": names}, value, sd
 

@@ -82,11 +82,11 @@ def save_fit(
 
 def _write_cycles(fit: Fit, curves: CurvesByStage, folder: Path) -> None:
     """Write the tables of `Fit.contact_phases` and `Fit.peaks`; where there are strides, of these, too."""
-    phases = [one for one in curves["estimate"] if one.stride.phase != "stride"]
+    phases = [curve for curve in curves["estimate"] if curve.stride.phase != "stride"]
     if phases:
         write_columns(folder / "contact_phases.csv", phase_columns(phases), _SIX_DIGITS)
     names = {trial.name for trial in fit.trials if trial.joint_curves is not None}
-    peaks = peak_columns([one for one in curves["estimate"] if one.trial in names])
+    peaks = peak_columns([curve for curve in curves["estimate"] if curve.trial in names])
     if peaks["peak"]:
         write_columns(folder / "moment_peaks.csv", peaks, _SIX_DIGITS)
     if not any(trial.strides for trial in fit.trials):
@@ -134,8 +134,8 @@ def write_model(fit: Fit, folder: Path) -> None:
 
     positions = {marker.label: marker.position for marker in fit.skeleton.markers}
     shifts = centre_offsets(fit.skeleton)
-    own = fit.file.skeleton.segments
-    welds = {joint.child: joint.parent for joint in fit.skeleton.joints if joint.child not in own}
+    segments = fit.file.skeleton.segments
+    welds = {joint.child: joint.parent for joint in fit.skeleton.joints if joint.child not in segments}
     changes = write_osim(folder / "model.osim", fit.file, fit.estimate, positions, shifts, welds)
     changes.map(inert).to_csv(folder / "model_changes.csv", index=False, lineterminator="\n")
 
@@ -146,7 +146,7 @@ def _write_trial(fit: Fit, trial: TrialFit, folder: Path) -> None:
     time, stages, deviations = trial.time, trial.joint_loads, trial.deviations
     if curves is not None:
         rows = np.flatnonzero(curves.known.any(axis=1))
-        time, stages = curves.time[rows], {stage: each[rows] for stage, each in curves.forces.items()}
+        time, stages = curves.time[rows], {stage: force[rows] for stage, force in curves.forces.items()}
         deviations = None if curves.deviations is None else curves.deviations.at(rows)
     if deviations is not None:
         sd = deviations.coordinates
@@ -232,8 +232,8 @@ def summary(fit: Fit) -> dict[str, Any]:
         "verdict": fit.overview.verdict,
         "rules_run": fit.rules,
         "trials_left_out": list(fit.left_out),
-        "findings": [one.to_dict() for one in fit.findings],
-        "suitability": [asdict(one) for one in suitability(fit, fit.findings, fit.left_out)],
+        "findings": [finding.to_dict() for finding in fit.findings],
+        "suitability": [asdict(rating) for rating in suitability(fit, fit.findings, fit.left_out)],
         "warnings": list(fit.overview.lines(Severity.WARNING, Severity.ERROR)),
         "corrections": list(fit.overview.lines(Severity.CORRECTED)),
         "notes": list(fit.notes),
@@ -246,7 +246,7 @@ def _posterior_summary(fit: Fit) -> dict[str, Any]:
     noise = {trial.name: dict(vars(noise)) for trial, noise in zip(fit.trials, fit.posterior.marker_noise, strict=True)}
     return {
         "iterations": fit.posterior.iterations,
-        "calibration": [asdict(one) for one in fit.posterior.calibration],
+        "calibration": [asdict(entry) for entry in fit.posterior.calibration],
         "marker_noise": noise,
         "identifiability": _identifiability(fit.bsp_columns(), fit.posterior.base),
     }
@@ -271,9 +271,9 @@ def _identifiability(bsp: Mapping[str, Sequence[Any]], base: BaseParameters) -> 
 
 
 def _trial_summary(fit: Fit, trial: TrialFit) -> dict[str, Any]:
-    force, moment = ({stage: each[:, part] for stage, each in trial.residuals.items()} for part in _PARTS)
+    force, moment = ({stage: load[:, part] for stage, load in trial.residuals.items()} for part in _PARTS)
     full_force, full_moment = (
-        {stage: each[:, part] for stage, each in trial.full_residuals.items()} for part in _PARTS
+        {stage: load[:, part] for stage, load in trial.full_residuals.items()} for part in _PARTS
     )
     return {
         "name": trial.name,
@@ -340,8 +340,10 @@ def write_draws(fit: Fit, folder: Path, count: int, seed: int = 0) -> None:
         into.mkdir()
         write_model(drawn, into)
         for trial in drawn.trials:
-            own = into if len(drawn.trials) == 1 else into / trial.name
-            own.mkdir(exist_ok=True)
+            trial_folder = into if len(drawn.trials) == 1 else into / trial.name
+            trial_folder.mkdir(exist_ok=True)
             remark = f"Posterior draw {number + 1} of {fit.subject.name}"
-            write_table(own / "kinematics.mot", coordinates_table(drawn, trial), "kinematics", remark)
-            write_ground_reactions(own, trial.reactions, trial.kinematics.window_s, drawn.skeleton.feet, remark)
+            write_table(trial_folder / "kinematics.mot", coordinates_table(drawn, trial), "kinematics", remark)
+            write_ground_reactions(
+                trial_folder, trial.reactions, trial.kinematics.window_s, drawn.skeleton.feet, remark
+            )

@@ -98,8 +98,11 @@ def _joint_tables(trial: TrialFit) -> dict[str, Table]:
         values["joint_moments_sd"] = joints.names, curves.moment_sd
         values["joint_forces_sd"] = joints.force_names, curves.force_sd
     return {
-        table: {"time_s": curves.time, **dict(zip(names, each.reshape(len(each), -1).T, strict=True))}
-        for table, (names, each) in values.items()
+        table: {
+            "time_s": curves.time,
+            **dict(zip(names, values_of_joints.reshape(len(values_of_joints), -1).T, strict=True)),
+        }
+        for table, (names, values_of_joints) in values.items()
     }
 
 

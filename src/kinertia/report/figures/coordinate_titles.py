@@ -145,23 +145,23 @@ def _imported_title(name: str, sides: Sequence[str], skeleton: Skeleton) -> str:
 
 def title_of(skeleton: Skeleton, column: int) -> str:
     """Title one coordinate: "hip flexion, right"."""
-    for one in panels_of(skeleton):
-        for side, index in one.columns.items():
+    for coordinate in panels_of(skeleton):
+        for side, index in coordinate.columns.items():
             if index == column:
-                words = one.title.removesuffix(" +").split(",")[0]
+                words = coordinate.title.removesuffix(" +").split(",")[0]
                 return words[0].lower() + words[1:] + {"r": ", right", "l": ", left", "": ""}[side]
     raise IndexError(column)
 
 
-def load_title(one: Coordinate, what: str) -> str:
+def load_title(coordinate: Coordinate, what: str) -> str:
     """Title the moment about a coordinate with its sign: "Hip flexion +" as "Hip moment, flexion +".
 
     Words for which a figure with three panels side by side has no room are left out: "Trunk bending, to the right +" is
     "Trunk moment, bending right +".
     """
-    if not one.title.endswith(" +"):
-        return f"{one.title} {what}"
-    joint, _, direction = one.title.partition(" ")
+    if not coordinate.title.endswith(" +"):
+        return f"{coordinate.title} {what}"
+    joint, _, direction = coordinate.title.partition(" ")
     return f"{joint} {what}, {direction.replace(', to the', '').replace(',', '')}"
 
 
@@ -176,12 +176,12 @@ def joint_moment_words(name: str) -> tuple[str, str]:
     return "Trunk" if joint == "lumbar" else joint.capitalize(), words
 
 
-def power_title(one: Coordinate, others: Sequence[Coordinate]) -> str:
+def power_title(coordinate: Coordinate, others: Sequence[Coordinate]) -> str:
     """Title the power of a coordinate, whose sign is not a direction's: "Knee power, generation +".
 
     If the joint has several coordinates among `others`, the title includes which: "Hip flexion power, generation +".
     """
-    name = one.title
+    name = coordinate.title
     if name.endswith(" +"):
         joint = name.partition(" ")[0]
         alone = sum(other.title.partition(" ")[0] == joint for other in others) == 1
@@ -189,32 +189,32 @@ def power_title(one: Coordinate, others: Sequence[Coordinate]) -> str:
     return f"{name} power, generation +"
 
 
-def same_segment(segment: str, one: Skeleton, other: Skeleton) -> bool:
+def same_segment(segment: str, skeleton: Skeleton, other: Skeleton) -> bool:
     """Return whether in both models a segment has the same joint to the same parent, and the same segments joined to
     it.
 
     Items welded to it, such as a rucksack, do not matter.
     """
-    return _neighbours(segment, one) == _neighbours(segment, other)
+    return _neighbours(segment, skeleton) == _neighbours(segment, other)
 
 
 def _neighbours(segment: str, skeleton: Skeleton) -> tuple[set[tuple[str, str]], set[str]]:
-    own = {
+    joints_above = {
         (joint.parent, axis.coordinate) for joint in skeleton.joints if joint.child == segment for axis in joint.axes
     }
-    return own, {joint.child for joint in skeleton.joints if joint.parent == segment and joint.axes}
+    return joints_above, {joint.child for joint in skeleton.joints if joint.parent == segment and joint.axes}
 
 
-def same_sign(name: str, side: str, one: Skeleton, other: Skeleton) -> int:
+def same_sign(name: str, side: str, skeleton: Skeleton, other: Skeleton) -> int:
     """Return 1 where a leg's coordinate rotates the foot in the same direction in both, -1 where in opposite ones; 0
     where it rotates about another axis, or one has no such coordinate.
     """
-    return sign_along(turning(name, side, one), turning(name, side, other))
+    return sign_along(turning(name, side, skeleton), turning(name, side, other))
 
 
-def sign_along(one: np.ndarray, other: np.ndarray) -> int:
+def sign_along(axis: np.ndarray, other: np.ndarray) -> int:
     """Return 1 for unit vectors (3,) in the same direction, -1 for opposite ones, 0 for others."""
-    cosine = float(one @ other)
+    cosine = float(axis @ other)
     return int(np.sign(cosine)) if abs(cosine) > _ALIKE else 0
 
 
@@ -256,5 +256,5 @@ def signed_joint_moment(name: str, skeleton: Skeleton, convention: SignConventio
 
 def _is_turned(name: str, opposite: str, skeleton: Skeleton) -> bool:
     """Return whether the coordinate about the moment's axis is positive in the opposite direction."""
-    titles = {one.name: one.title for one in panels_of(skeleton)}
+    titles = {coordinate.name: coordinate.title for coordinate in panels_of(skeleton)}
     return bool(opposite) and f" {opposite} +" in titles.get(_COORDINATES.get(name, ""), "")

@@ -75,7 +75,7 @@ def cycle_figures(
     names = {trial.name for trial in fit.trials}
     known = curves or drawn_curves(fit)
     estimate, literature = (
-        _by_quantity(one for one in known[stage] if one.trial in names) for stage in ("estimate", "literature")
+        _by_quantity(curve for curve in known[stage] if curve.trial in names) for stage in ("estimate", "literature")
     )
     drawn = _Drawn(fit, estimate, literature, norms, legs=legs)
     figures = {kind: drawn.figure(kind) for kind in UNITS}
@@ -98,15 +98,17 @@ def phase_figures(fit: Fit, curves: CurvesByStage | None = None, legs: bool = Fa
     Of stances the joint moments alone: angles and the rest are in the figures over the gait cycle, or over time.
     """
     known, result = curves or drawn_curves(fit), []
-    shown = [one for one in known["estimate"] if one.stride.phase != "stride"]
-    for task, phase in dict.fromkeys((one.task, one.stride.phase) for one in shown):
-        own = {stage: [one for one in some if one.task == task] for stage, some in known.items()}
-        estimate, literature = (_by_quantity(own[stage], phase) for stage in ("estimate", "literature"))
+    shown = [curve for curve in known["estimate"] if curve.stride.phase != "stride"]
+    for task, phase in dict.fromkeys((curve.task, curve.stride.phase) for curve in shown):
+        of_task = {stage: [curve for curve in some if curve.task == task] for stage, some in known.items()}
+        estimate, literature = (_by_quantity(of_task[stage], phase) for stage in ("estimate", "literature"))
         drawn = _Drawn(fit, estimate, literature, {}, phase, legs)
         kinds: tuple[Kind, ...] = _OF_LANDINGS if phase == "landing" else ("joint_moment",)
         figures = {kind: drawn.figure(kind) for kind in kinds}
-        of_phase = [one for one in own["estimate"] if one.stride.phase == phase]
-        result.append(PhaseFigures(task, phase, of_phase, {k: each for k, each in figures.items() if each is not None}))
+        of_phase = [curve for curve in of_task["estimate"] if curve.stride.phase == phase]
+        result.append(
+            PhaseFigures(task, phase, of_phase, {k: figure for k, figure in figures.items() if figure is not None})
+        )
     return tuple(result)
 
 
@@ -127,8 +129,8 @@ def drawn_curves(fit: Fit) -> CurvesByStage:
 
 def _by_quantity(curves: Iterable[CycleCurve], phase: Phase = "stride") -> Curves:
     result: dict[tuple[str, str], list[CycleCurve]] = {}
-    for one in (each for each in curves if each.stride.phase == phase):
-        result.setdefault((one.quantity, one.stride.side), []).append(one)
+    for curve in (candidate for candidate in curves if candidate.stride.phase == phase):
+        result.setdefault((curve.quantity, curve.stride.side), []).append(curve)
     return result
 
 
@@ -140,14 +142,14 @@ def titled_quantities(skeleton: Skeleton, kind: Kind) -> list[tuple[str, str]]:
         return [(name, title) for name, title, _ in _signed_quantities(skeleton, kind, _OF_FILES[kind])]
     if kind == "force":
         return list(_FORCE_TITLES.items())
-    coordinates = [one for one in panels_of(skeleton) if one.rotational]
+    coordinates = [coordinate for coordinate in panels_of(skeleton) if coordinate.rotational]
     if kind == "angle":
-        return [(f"{one.name}_angle", one.title) for one in coordinates]
+        return [(f"{coordinate.name}_angle", coordinate.title) for coordinate in coordinates]
     if kind == "power":  # powers of arms and trunk are negligible
         legs = _leg_coordinates(skeleton)
-        coordinates = [one for one in coordinates if legs & set(one.columns.values())]
-        return [(f"{one.name}_power", power_title(one, coordinates)) for one in coordinates]
-    return [(f"{one.name}_moment", load_title(one, "moment")) for one in coordinates]
+        coordinates = [coordinate for coordinate in coordinates if legs & set(coordinate.columns.values())]
+        return [(f"{coordinate.name}_power", power_title(coordinate, coordinates)) for coordinate in coordinates]
+    return [(f"{coordinate.name}_moment", load_title(coordinate, "moment")) for coordinate in coordinates]
 
 
 def _signed_quantities(skeleton: Skeleton, kind: Kind, convention: SignConvention) -> list[tuple[str, str, float]]:
@@ -210,8 +212,8 @@ class _Drawn:
         if norm := self.norms.get(quantity):
             yield from _norm(replace(norm, mean=sign * norm.mean), self._opposite(quantity))
         for side in FEET:
-            both = (each.get((quantity, side), []) for each in (self.estimate, self.usual))
-            curves, usual = ([replace(one, value=sign * one.value) for one in some] for some in both)
+            both = (curves_by_side.get((quantity, side), []) for curves_by_side in (self.estimate, self.usual))
+            curves, usual = ([replace(curve, value=sign * curve.value) for curve in some] for some in both)
             word, colour = SIDES[side]
             if curves:
                 yield from _estimate(curves, word, colour)
@@ -255,7 +257,7 @@ class _Drawn:
             "force": "Ground reactions",
             "clinical": "Clinical angles",
         }
-        shown = {(one.trial, one.stride) for own in self.estimate.values() for one in own}
+        shown = {(curve.trial, curve.stride) for by_quantity in self.estimate.values() for curve in by_quantity}
         counts = [sum(stride.side == side for _, stride in shown) for side in FEET]
         against = "by inverse kinematics" if kind == "clinical" else f"estimate against {self._usual_name(kind)}"
         strides = f"{self.phase}s: {counts[0]} right, {counts[1]} left"
@@ -287,7 +289,7 @@ def _leg_coordinates(skeleton: Skeleton) -> set[int]:
 def _estimate(curves: Sequence[CycleCurve], word: str, colour: str) -> Iterator[dict[str, Any]]:
     """Draw bands below, strides, and their mean on top, which alone is in the legend."""
     quiet = {"showlegend": False}
-    values = np.array([one.value for one in curves])
+    values = np.array([curve.value for curve in curves])
     common = common_strides(values)
     mean, spread = mean_of(values[common]), _spread(values[common])
     if spread is not None:
@@ -296,7 +298,7 @@ def _estimate(curves: Sequence[CycleCurve], word: str, colour: str) -> Iterator[
             "name": f"{word}, mean ± SD",
             **quiet,
         }
-    half = INTERVAL_SD * mean_of(np.array([one.sd for one in curves])[common])
+    half = INTERVAL_SD * mean_of(np.array([curve.sd for curve in curves])[common])
     if np.isfinite(half).any():
         name = f"{word}, 95 % of the estimate"
         yield {**band(mean - half, mean + half, faded(colour, _BAND_OPACITY)), "name": name, **quiet}
@@ -311,16 +313,16 @@ def _estimate(curves: Sequence[CycleCurve], word: str, colour: str) -> Iterator[
 
 def mean_curve(curves: Sequence[CycleCurve]) -> np.ndarray:
     """Return the mean (101,) of the strides that are complete, or were measured longest; NaN where one has a gap."""
-    return mean_of_common(np.array([one.value for one in curves]))
+    return mean_of_common(np.array([curve.value for curve in curves]))
 
 
 def usual_mean(usual: Sequence[CycleCurve], estimate: Sequence[CycleCurve]) -> np.ndarray:
     """Return the mean (101,) of the strides in the estimate's mean, so that they differ by the method alone."""
     if not estimate:
         return mean_curve(usual)
-    common = common_strides(np.array([one.value for one in estimate]))
-    same = {(one.trial, one.stride.number) for one, taken in zip(estimate, common, strict=True) if taken}
-    values = [one.value for one in usual if (one.trial, one.stride.number) in same]
+    common = common_strides(np.array([curve.value for curve in estimate]))
+    same = {(curve.trial, curve.stride.number) for curve, taken in zip(estimate, common, strict=True) if taken}
+    values = [curve.value for curve in usual if (curve.trial, curve.stride.number) in same]
     return mean_of(np.array(values).reshape(-1, len(PERCENT)))
 
 
@@ -344,8 +346,8 @@ def mean_line(values: np.ndarray) -> dict[str, Any]:
 def _strides(curves: Sequence[CycleCurve]) -> dict[str, Any]:
     """Draw all strides as one line with gaps between them."""
     x = np.tile(np.append(PERCENT, 100), len(curves)).astype(np.uint8)
-    y = np.concatenate([np.append(one.value, np.nan) for one in curves])
-    titles = [f"{plain(one.trial)}, {SIDES[one.stride.side][0]} stride {one.stride.number}" for one in curves]
+    y = np.concatenate([np.append(curve.value, np.nan) for curve in curves])
+    titles = [f"{plain(curve.trial)}, {SIDES[curve.stride.side][0]} stride {curve.stride.number}" for curve in curves]
     hover = "%{x:.0f} %: %{y:.3g}<extra>" + (titles[0] if len(titles) == 1 else "%{fullData.name}") + "</extra>"
     return {"type": "scatter", "mode": "lines", "x": x, "y": compact(y), "hovertemplate": hover}
 

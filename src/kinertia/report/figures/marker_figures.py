@@ -99,7 +99,7 @@ def gap_figure(markers: Markers, windows_s: Sequence[tuple[float, float]], name:
         "margin": {"t": 12, "b": 44, "l": 12, "r": 14},
         "xaxis": {"title": {"text": "time (s)"}, "range": [float(time[0]), float(time[-1])], "gridcolor": "#EFEFEF"},
         "yaxis": {**_LABELS, "range": [len(names) - 0.3, -0.7]},
-        "shapes": [{**one, "fillcolor": SKY, "opacity": 0.18} for one in blue],
+        "shapes": [{**shape, "fillcolor": SKY, "opacity": 0.18} for shape in blue],
         "showlegend": False,
     }
     return Figure([{**line, "hovertemplate": "%{y}, %{x:.3f} s<extra></extra>"}], layout)

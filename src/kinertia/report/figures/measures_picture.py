@@ -93,12 +93,12 @@ def _spread(names: list[str], ends: dict[str, tuple[float, float, float]]) -> di
 
 def _person() -> tuple[list[list[tuple[float, float]]], dict[str, tuple[float, float, float]]]:
     """Return outlines in cm, and by level the middle of its line (x, y) and half its length."""
-    cm = dict(zip((one.key for one in measures()), 100.0 * usual_build().median_m, strict=True))
+    cm = dict(zip((measure.key for measure in measures()), 100.0 * usual_build().median_m, strict=True))
     wide = {measures()[girth].key: measures()[width].key for girth, width in girths_with_widths()}
 
     def half(key: str) -> float:
-        own = wide.get(key, "")
-        return float(0.5 * cm[own] if own.endswith("w") else cm[key] / (2.0 * np.pi))
+        width_key = wide.get(key, "")
+        return float(0.5 * cm[width_key] if width_key.endswith("w") else cm[key] / (2.0 * np.pi))
 
     trunk = [(0.0, half("Ls0p")), *((cm[f"Ls{k}L"], half(f"Ls{k}p")) for k in (1, 2, 3))]
     trunk += [(cm["Ls4L"], 0.5 * cm["Ls4w"]), (cm["Ls5L"], 0.5 * cm["Ls4w"] - 2.0)]
@@ -121,9 +121,11 @@ def _person() -> tuple[list[list[tuple[float, float]]], dict[str, tuple[float, f
     for letter, (x, top, down, halves) in limbs.items():
         for sign in (1.0, -1.0):
             edge = list(zip(down, halves, strict=True))
-            right = [(sign * x + each, top - length) for length, each in edge]
-            outlines.append(right + [(sign * x - each, top - length) for length, each in reversed(edge)])
+            right = [(sign * x + half_width, top - length) for length, half_width in edge]
+            outlines.append(right + [(sign * x - half_width, top - length) for length, half_width in reversed(edge)])
         sign = 1.0 if letter == "A" else -1.0
-        ends |= {f"{letter}{k}": (sign * x, top - length, each) for k, (length, each) in enumerate(edge)}
-    outlines.append([(each, y) for y, each in body] + [(-each, y) for y, each in reversed(body)])
+        ends |= {f"{letter}{k}": (sign * x, top - length, half_width) for k, (length, half_width) in enumerate(edge)}
+    outlines.append(
+        [(half_width, y) for y, half_width in body] + [(-half_width, y) for y, half_width in reversed(body)]
+    )
     return outlines, ends

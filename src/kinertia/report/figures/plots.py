@@ -260,8 +260,8 @@ class FitFigures(Generic[T]):
         """Draw joint moments over the gait cycle; over time for a given trial, or without strides."""
         if trial is None and self._walked:
             return self.cycles("moment")
-        fit, one = self.fit, self._trial(trial)
-        return self._of_trial(one, moment_figure(one, fit.skeleton, fit.mass_kg, start=start_of(fit)))
+        fit, chosen = self.fit, self._trial(trial)
+        return self._of_trial(chosen, moment_figure(chosen, fit.skeleton, fit.mass_kg, start=start_of(fit)))
 
     def angles(self, trial: str | None = None) -> T:
         """Draw joint angles over the gait cycle; over time for a given trial, or without strides."""
@@ -289,13 +289,13 @@ class FitFigures(Generic[T]):
 
     def coordinates(self, trial: str | None = None) -> T:
         """Draw every coordinate over time, by inverse kinematics and as estimated."""
-        one = self._trial(trial)
-        return self._of_trial(one, coordinate_figure(one, self.fit.skeleton))
+        chosen = self._trial(trial)
+        return self._of_trial(chosen, coordinate_figure(chosen, self.fit.skeleton))
 
     def residuals(self, trial: str | None = None) -> T:
         """Draw root residual force and moment over time, stage by stage."""
-        one = self._trial(trial)
-        return self._of_trial(one, residual_figure(one, start=start_of(self.fit)))
+        chosen = self._trial(trial)
+        return self._of_trial(chosen, residual_figure(chosen, start=start_of(self.fit)))
 
     def bsp(self) -> T:
         """Draw changes of body segment parameters in kg, mm and kg m2, with intervals where there are any."""
@@ -317,20 +317,20 @@ class FitFigures(Generic[T]):
 
     def markers(self, trial: str | None = None) -> T:
         """Draw the distance between every measured and modelled marker."""
-        one = self._trial(trial)
-        noise = None if self.fit.posterior is None else self.fit.posterior.marker_noise[self.fit.trials.index(one)]
-        return self._of_trial(one, marker_figure(one, () if noise is None else noise.drifting))
+        chosen = self._trial(trial)
+        noise = None if self.fit.posterior is None else self.fit.posterior.marker_noise[self.fit.trials.index(chosen)]
+        return self._of_trial(chosen, marker_figure(chosen, () if noise is None else noise.drifting))
 
     def gaps(self, trial: str | None = None) -> T:
         """Draw when markers were not visible; a sentence where all always were."""
-        one = self._trial(trial)
-        nothing = sentence_figure(f"Every marker of {one.name} was seen in every frame: there are no gaps.")
-        return self._of_trial(one, fit_gap_figure(one) or nothing)
+        chosen = self._trial(trial)
+        nothing = sentence_figure(f"Every marker of {chosen.name} was seen in every frame: there are no gaps.")
+        return self._of_trial(chosen, fit_gap_figure(chosen) or nothing)
 
     def skeleton(self, trial: str | None = None) -> T:
         """Draw the skeleton in motion, with markers, centres of mass and ground reactions."""
-        one = self._trial(trial)
-        return self._of_trial(one, skeleton_figure(self.fit, one))
+        chosen = self._trial(trial)
+        return self._of_trial(chosen, skeleton_figure(self.fit, chosen))
 
     @property
     def _walked(self) -> bool:

@@ -123,11 +123,11 @@ def _millimetres(positions: np.ndarray) -> str:
 def view(scenes: Sequence[tuple[str, Scene]]) -> dict[str, Any]:
     """Arrange scenes with the names of their trials for the templates, in one view with a selector."""
     parts: dict[str, str] = {}
-    for _, one in scenes:
-        parts |= one.parts()
+    for _, drawing in scenes:
+        parts |= drawing.parts()
     return {
         "names": [name for name, _ in scenes],
-        "scenes": [Markup(json.dumps(packed(one)).replace("<", "\\u003c")) for _, one in scenes],  # nosec B704
+        "scenes": [Markup(json.dumps(packed(drawing)).replace("<", "\\u003c")) for _, drawing in scenes],  # nosec B704
         "parts": {name: words for name, words in PARTS.items() if name in parts},
     }
 

@@ -108,15 +108,15 @@ def coordinate_figure(trial: TrialFit, skeleton: Skeleton, most_frames: int = MO
     )
     sd = None if trial.deviations is None else trial.deviations.coordinates
     panels = []
-    for one in panels_of(skeleton):
-        scale = np.degrees(1.0) if one.rotational else 1.0
+    for coordinate in panels_of(skeleton):
+        scale = np.degrees(1.0) if coordinate.rotational else 1.0
         thin = thinned(len(trial.time), most_frames)
-        traces = [] if sd is None else bands(one, trial.time, scale * trial.motion.q, scale * sd, thin)
+        traces = [] if sd is None else bands(coordinate, trial.time, scale * trial.motion.q, scale * sd, thin)
         for name, time, values, line in stages:
             thin = thinned(len(time), most_frames)
-            traces += lines_by_side(one, name, time, scale * values, thin, line)
-        unit = "degrees" if one.rotational else "m"
-        panels.append(Panel(f"{one.title} ({unit})", traces, [*unused, *event_lines(events, one)]))
+            traces += lines_by_side(coordinate, name, time, scale * values, thin, line)
+        unit = "degrees" if coordinate.rotational else "m"
+        panels.append(Panel(f"{coordinate.title} ({unit})", traces, [*unused, *event_lines(events, coordinate)]))
     change = np.degrees(motion_change(trial)[:, skeleton.rotational])
     alt = (
         f"Coordinates of {trial.name} over time, inverse kinematics against estimate; the joint angles differ by "
@@ -133,7 +133,7 @@ def motion_change(trial: TrialFit) -> np.ndarray:
 
 def panel_over_time(
     trial: TrialFit,
-    one: Coordinate,
+    coordinate: Coordinate,
     lines: Mapping[str, tuple[np.ndarray, dict[str, Any]]],
     band: tuple[np.ndarray, np.ndarray],
     most_frames: int = MOST_FRAMES,
@@ -142,23 +142,25 @@ def panel_over_time(
 
     Args:
         trial: trial of the frames.
-        one: title, and the column of each side.
+        coordinate: title, and the column of each side.
         lines: values (w, c) and style of the line by name.
         band: values and SDs (w, c).
         most_frames: largest number of frames drawn per curve.
     """
     axis, thin = time_axis(trial.kinematics), thinned(len(trial.time), most_frames)
-    traces = bands(one, trial.time, *band, thin) if np.isfinite(band[1]).any() else []
+    traces = bands(coordinate, trial.time, *band, thin) if np.isfinite(band[1]).any() else []
     for name, (values, line) in lines.items():
-        traces += lines_by_side(one, name, trial.time, values, thin, line)
-    marks = [*_unused(trial.kinematics, axis), *event_lines(shown_events(trial.kinematics), one)]
-    return Panel(one.title, traces, marks)
+        traces += lines_by_side(coordinate, name, trial.time, values, thin, line)
+    marks = [*_unused(trial.kinematics, axis), *event_lines(shown_events(trial.kinematics), coordinate)]
+    return Panel(coordinate.title, traces, marks)
 
 
-def bands(one: Coordinate, time: np.ndarray, values: np.ndarray, sd: np.ndarray, thin: slice) -> list[dict[str, Any]]:
+def bands(
+    coordinate: Coordinate, time: np.ndarray, values: np.ndarray, sd: np.ndarray, thin: slice
+) -> list[dict[str, Any]]:
     """Draw a 95 % band around values (w, c) per side: an invisible lower edge, and an upper one filled down to it."""
     traces, thin = [], slice(None, None, BAND_EVERY * thin.step)
-    for side, column in one.columns.items():
+    for side, column in coordinate.columns.items():
         word, colour = SIDES[side]
         middle, half = values[:, column], INTERVAL_SD * sd[:, column]
         edge = {"line": {"width": 0}, "hoverinfo": "skip", "hovertemplate": None}
@@ -171,7 +173,7 @@ def bands(one: Coordinate, time: np.ndarray, values: np.ndarray, sd: np.ndarray,
 
 
 def lines_by_side(
-    one: Coordinate, name: str, time: np.ndarray, values: np.ndarray, thin: slice, line: dict[str, Any]
+    coordinate: Coordinate, name: str, time: np.ndarray, values: np.ndarray, thin: slice, line: dict[str, Any]
 ) -> list[dict[str, Any]]:
     """Draw a line per side, with its colour and a name that begins with the side; the legend explains sides only."""
     return [
@@ -181,7 +183,7 @@ def lines_by_side(
             "line": {"color": SIDES[side][1], **line},
             "showlegend": bool(side),
         }
-        for side, column in one.columns.items()
+        for side, column in coordinate.columns.items()
     ]
 
 
@@ -232,9 +234,9 @@ def shown_events(kinematics: Kinematics, axis: Mapping[str, Any] | None = None) 
     return shown if len(shown) <= MOST_EVENTS else []
 
 
-def event_lines(events: Sequence[GaitEvent], one: Coordinate | None = None) -> list[dict[str, Any]]:
+def event_lines(events: Sequence[GaitEvent], coordinate: Coordinate | None = None) -> list[dict[str, Any]]:
     """Draw lines at the events of the sides that the coordinate is on; at all events where it is on none."""
-    sides = [] if one is None else [side for side in one.columns if side]
+    sides = [] if coordinate is None else [side for side in coordinate.columns if side]
     return [_vertical_line(event) for event in events if not sides or event.side in sides]
 
 
@@ -262,11 +264,11 @@ class _Loads:
             )
         return cls(curves.time, dict(curves.forces), None if curves.deviations is None else curves.deviations.moments)
 
-    def drawn(self, axis: dict[str, Any], one: Coordinate) -> list[dict[str, Any]]:
+    def drawn(self, axis: dict[str, Any], coordinate: Coordinate) -> list[dict[str, Any]]:
         """Shade the parts of the axis in which the estimate of a side is not known."""
         first, last = axis["range"]
         result = []
-        for side, column in one.columns.items():
+        for side, column in coordinate.columns.items():
             colour = UNUSED if side not in SIDES or not side else faded(SIDES[side][1], _FAINT)
             known = np.isfinite(self.stages["estimate"][:, column])
             ends = [first, *(t for a, b in runs(known) for t in (self.time[a], self.time[b])), last]
@@ -292,22 +294,26 @@ def moment_figure(
     thin, events = thinned(len(loads.time), most_frames), shown_events(trial.kinematics, axis)
     sd, middle = None if loads.sd is None else loads.sd / mass_kg, loads.stages["estimate"] / mass_kg
     panels = []
-    for one in panels_of(skeleton):
-        if min(one.columns.values()) < _ROOT_COORDINATES:
+    for coordinate in panels_of(skeleton):
+        if min(coordinate.columns.values()) < _ROOT_COORDINATES:
             continue
-        traces = [] if sd is None else bands(one, loads.time, middle, sd, thin)
+        traces = [] if sd is None else bands(coordinate, loads.time, middle, sd, thin)
         for stage, line in (("literature", {"dash": "dot", "width": 1.6}), ("estimate", {"width": 2})):
             values = loads.stages[stage] / mass_kg
-            traces += lines_by_side(one, stage_name(stage, start), loads.time, values, thin, line)
+            traces += lines_by_side(coordinate, stage_name(stage, start), loads.time, values, thin, line)
         if truth is not None:
             dashed = {"color": BLACK, "dash": "dash", "width": 1.4}
-            own = thinned(len(trial.time), most_frames)
+            rows = thinned(len(trial.time), most_frames)
             traces += [
                 {**curve, "name": "truth"}
-                for curve in lines_by_side(one, "truth", trial.time, truth / mass_kg, own, dashed)
+                for curve in lines_by_side(coordinate, "truth", trial.time, truth / mass_kg, rows, dashed)
             ]
-        title = f"{load_title(one, 'moment')} (N m/kg)" if one.rotational else f"{load_title(one, 'force')} (N/kg)"
-        panels.append(Panel(title, traces, [*loads.drawn(axis, one), *event_lines(events, one)]))
+        title = (
+            f"{load_title(coordinate, 'moment')} (N m/kg)"
+            if coordinate.rotational
+            else f"{load_title(coordinate, 'force')} (N/kg)"
+        )
+        panels.append(Panel(title, traces, [*loads.drawn(axis, coordinate), *event_lines(events, coordinate)]))
     peak = np.nanmax(np.abs(middle[:, _ROOT_COORDINATES:]), initial=0.0)
     alt = f"Joint moments of {trial.name} over time, {start.word} against estimate; the largest is {peak:.2f} N m/kg."
     return small_multiples(panels, alt, axis)
@@ -333,13 +339,15 @@ def joint_moment_figure(
         for component, name in enumerate(component_names(base)):
             columns.setdefault(name, {})[side] = 3 * row + component
     panels = []
-    for name, own in columns.items():
+    for name, column in columns.items():
         title, sign = signed_joint_moment(name, trial.skeleton, convention)
-        one = Coordinate(name, f"{title} (internal N m/kg)", own, True)
+        coordinate = Coordinate(name, f"{title} (internal N m/kg)", column, True)
         values = sign * loads.stages["estimate"]
-        traces = [] if sd is None else bands(one, loads.time, values, sd / mass_kg, thin)
-        traces += lines_by_side(one, "estimate", loads.time, values, thin, {"width": 2})
-        panels.append(Panel(one.title, traces, [*loads.drawn(axis, one), *event_lines(events, one)]))
+        traces = [] if sd is None else bands(coordinate, loads.time, values, sd / mass_kg, thin)
+        traces += lines_by_side(coordinate, "estimate", loads.time, values, thin, {"width": 2})
+        panels.append(
+            Panel(coordinate.title, traces, [*loads.drawn(axis, coordinate), *event_lines(events, coordinate)])
+        )
     alt = f"Three-dimensional joint moments of {trial.name} over time, wherever they are known."
     return small_multiples(panels, alt, axis)
 

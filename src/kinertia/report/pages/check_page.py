@@ -95,23 +95,23 @@ def render_check(
     """Render the page as text; arguments as in `save_check_page`. The first six recordings have pictures."""
     pictured = recordings[:MOST_TRIALS]
     most_frames = VIEW_FRAMES // max(len(pictured), 1)
-    scenes = [(one.context.name, marker_scene(one.recording, one.used_set, most_frames)) for one in pictured]
+    scenes = [(check.context.name, marker_scene(check.recording, check.used_set, most_frames)) for check in pictured]
     of_models = [model.overview for model in models]
-    of_person = [one for one in overviews if not any(one is other for other in of_models)]
-    headlines = [("", one) for one in of_person] + [(model.name, model.overview) for model in models]
-    left_out = {name for one in of_person for name in one.left_out}
+    of_person = [overview for overview in overviews if not any(overview is other for other in of_models)]
+    headlines = [("", overview) for overview in of_person] + [(model.name, model.overview) for model in models]
+    left_out = {name for overview in of_person for name in overview.left_out}
     return rendered(
         "check.html.j2",
         title="Kinertia check",
-        headlines=headlines if len(headlines) > 1 else [("", one) for _, one in headlines],
+        headlines=headlines if len(headlines) > 1 else [("", overview) for _, overview in headlines],
         found=FindingView([*of_person, *(_named(model) for model in models)]),
         files=[
-            *(_recording(one, f"recording{k}", left_out) for k, one in enumerate(recordings, start=1)),
-            *(_checked(one.name, f"model{k}", one.overview.findings) for k, one in enumerate(models, start=1)),
+            *(_recording(check, f"recording{k}", left_out) for k, check in enumerate(recordings, start=1)),
+            *(_checked(model.name, f"model{k}", model.overview.findings) for k, model in enumerate(models, start=1)),
         ],
         most_unfolded=_MOST_UNFOLDED,
         recordings=recordings,
-        pictures=[check_figures(one) for one in pictured],
+        pictures=[check_figures(check) for check in pictured],
         scenes=view(scenes) if scenes else None,
         most_contacts=MOST_CONTACTS,
         models=models,
@@ -120,29 +120,29 @@ def render_check(
 
 def _named(model: ModelOverview) -> Overview:
     """Add the model's file to its findings, since several may be on the page."""
-    return replace(model.overview, findings=[one.in_file(model.name) for one in model.overview.findings])
+    return replace(model.overview, findings=[finding.in_file(model.name) for finding in model.overview.findings])
 
 
-def _recording(one: RecordingCheck, anchor: str, left_out: set[str]) -> Checked:
-    checked = _checked(one.context.name, anchor, one.findings)
+def _recording(check: RecordingCheck, anchor: str, left_out: set[str]) -> Checked:
+    checked = _checked(check.context.name, anchor, check.findings)
     return replace(checked, verdict=_LEFT_OUT) if checked.name in left_out else checked
 
 
 def _checked(name: str, anchor: str, findings: Sequence[Finding]) -> Checked:
     overview = Overview(findings, 0, 1)
-    found = dict.fromkeys(one.code for one in (*overview.waived, *reported(findings)))
+    found = dict.fromkeys(finding.code for finding in (*overview.waived, *reported(findings)))
     return Checked(name, anchor, overview.verdict, tuple(found))
 
 
 def check_figures(check: RecordingCheck) -> dict[str, Any]:
     """Draw the pictures of a recording: "forces", "pressure", "gaps"; None where there is nothing to draw."""
-    labels = [one.label for one in check.markers]
+    labels = [marker.label for marker in check.markers]
     figures: dict[str, Figure | None] = {
         "forces": force_figure(check),
         "pressure": pressure_figure(check),
         "gaps": gap_figure(check.recording.markers.select(labels), check.windows, check.recording.name),
     }
-    return {name: None if one is None else written(one) for name, one in figures.items()}
+    return {name: None if figure is None else written(figure) for name, figure in figures.items()}
 
 
 def force_figure(check: RecordingCheck) -> Figure | None:
@@ -153,7 +153,7 @@ def force_figure(check: RecordingCheck) -> Figure | None:
     plates = check.recording.plates
     if plates is None:
         return None
-    loaded = [p for p, one in enumerate(check.plates) if one.peak_n > LOAD_THRESHOLD_N]
+    loaded = [p for p, plate in enumerate(check.plates) if plate.peak_n > LOAD_THRESHOLD_N]
     shown = loaded or list(range(len(plates.names)))
     start, end = float(plates.time[0]), float(plates.time[-1])
     grey = _unmeasured(check, start, end)
@@ -215,13 +215,13 @@ def pressure_figure(check: RecordingCheck) -> Figure | None:
     None where no plate carries anything.
     """
     plates = check.recording.plates
-    contacts = [(p, contact) for p, one in enumerate(check.plates) for contact in one.contacts]
+    contacts = [(p, contact) for p, plate in enumerate(check.plates) for contact in plate.contacts]
     if plates is None or not contacts:
         return None
-    drawn = sorted(contacts, key=lambda one: one[1].start_s)[:MOST_CONTACTS]
+    drawn = sorted(contacts, key=lambda drawn_contact: drawn_contact[1].start_s)[:MOST_CONTACTS]
     outlines = [] if plates.corners is None else [_plate(plates, p) for p in range(len(plates.names))]
-    paths = [one for p, contact in drawn if (one := _path(plates, p, contact)) is not None]
-    feet = [one for _, contact in drawn if (one := _foot(check, contact)) is not None]
+    paths = [path for p, contact in drawn if (path := _path(plates, p, contact)) is not None]
+    feet = [path for _, contact in drawn if (path := _foot(check, contact)) is not None]
     traces = [*outlines, *feet, *paths]
     if not paths:
         return None

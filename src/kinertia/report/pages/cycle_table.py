@@ -53,8 +53,8 @@ def peak_rows(curves: Sequence[CycleCurve]) -> list[MeasureRow]:
     values, sds = (np.array(columns[name], dtype=float) for name in ("value", "sd"))
     rows = []
     for peak, unit in dict.fromkeys(zip(columns["peak"], columns["unit"], strict=True)):
-        own = np.array(columns["peak"]) == peak
-        sides = [own & (np.array(columns["side"]) == side) for side in FEET]
+        of_peak = np.array(columns["peak"]) == peak
+        sides = [of_peak & (np.array(columns["side"]) == side) for side in FEET]
         rows.append(MeasureRow(f"{peak} ({unit})", *(_with_interval(values[some], sds[some]) for some in sides)))
     return rows
 

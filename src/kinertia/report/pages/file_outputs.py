@@ -90,7 +90,9 @@ def compared_outputs(fit: Fit, trial: TrialFit) -> list[OutputComparison]:
     outputs = model_outputs(
         trial.skeleton, fit.estimate, trial.motion, loads, fit.mass_kg, "plug-in-gait", trial.deviations
     )
-    return [one for output in outputs if (one := _compared(trial, output, stated, fit.mass_kg)) is not None]
+    return [
+        comparison for output in outputs if (comparison := _compared(trial, output, stated, fit.mass_kg)) is not None
+    ]
 
 
 def _compared(trial: TrialFit, output: ModelOutput, stated: FileOutputs, mass_kg: float) -> OutputComparison | None:
@@ -116,12 +118,12 @@ def moment_divisor(stated: FileOutputs, kind: str, mass_kg: float) -> float:
 def outputs_figure(trial: TrialFit, compared: list[OutputComparison], most_frames: int = MOST_FRAMES) -> Figure:
     """Draw all quantities over time: ours with 95 % bands, the file's dashed."""
     panels = []
-    for quantity in dict.fromkeys(one.quantity for one in compared):
-        sides = [one for one in compared if one.quantity == quantity]
+    for quantity in dict.fromkeys(comparison.quantity for comparison in compared):
+        sides = [comparison for comparison in compared if comparison.quantity == quantity]
         title = f"{quantity} ({sides[0].unit})"
-        columns = {one.side: k for k, one in enumerate(sides)}
+        columns = {comparison.side: k for k, comparison in enumerate(sides)}
         ours, sd, theirs = (
-            np.stack([getattr(one, name) for one in sides], axis=1) for name in ("ours", "sd", "theirs")
+            np.stack([getattr(comparison, name) for comparison in sides], axis=1) for name in ("ours", "sd", "theirs")
         )
         coordinate = Coordinate(quantity, title, columns, True)
         lines: Mapping[str, tuple[np.ndarray, dict[str, Any]]] = {
@@ -137,29 +139,34 @@ def outputs_summary(fit: Fit) -> list[dict[str, Any]]:
     """Return the files' own outputs for `kinertia compare --json`, per trial, joint, side, quantity."""
     return [
         {
-            "trial": one.trial,
-            "side": one.side,
-            "quantity": one.quantity,
-            "unit": one.unit,
-            "rms": one.rms,
-            "mean": one.mean,
-            "correlation": one.correlation,
-            "outside": one.outside,
-            "beyond": one.beyond,
+            "trial": comparison.trial,
+            "side": comparison.side,
+            "quantity": comparison.quantity,
+            "unit": comparison.unit,
+            "rms": comparison.rms,
+            "mean": comparison.mean,
+            "correlation": comparison.correlation,
+            "outside": comparison.outside,
+            "beyond": comparison.beyond,
         }
         for trial in fit.trials
-        for one in compared_outputs(fit, trial)
+        for comparison in compared_outputs(fit, trial)
     ]
 
 
 def outputs_sentence(fit: Fit) -> str:
     """State how far the files' own joint moments are from Kinertia's, joint by joint; empty where they have none."""
-    compared = [one for trial in fit.trials for one in compared_outputs(fit, trial) if one.kind == "MOMENTS"]
+    compared = [
+        comparison
+        for trial in fit.trials
+        for comparison in compared_outputs(fit, trial)
+        if comparison.kind == "MOMENTS"
+    ]
     parts = []
-    for joint in dict.fromkeys(one.joint for one in compared):
-        own = [one for one in compared if one.joint == joint]
-        rms = float(np.sqrt(np.mean([one.rms**2 for one in own])))
-        beyond = ", beyond the error bar" if any(one.beyond for one in own) else ""
+    for joint in dict.fromkeys(comparison.joint for comparison in compared):
+        of_joint = [comparison for comparison in compared if comparison.joint == joint]
+        rms = float(np.sqrt(np.mean([comparison.rms**2 for comparison in of_joint])))
+        beyond = ", beyond the error bar" if any(comparison.beyond for comparison in of_joint) else ""
         parts.append(f"{joint.lower()} {rms:.2f}{beyond}")
     return f"RMS differences (N m/kg) from the files' own flexion moments: {'; '.join(parts)}" if parts else ""
 
@@ -171,20 +178,20 @@ def outputs_view(fit: Fit, trials: Sequence[TrialFit], most_frames: int = MOST_F
         compared = compared_outputs(fit, trial)
         if compared:
             figure = written(outputs_figure(trial, compared, most_frames))
-            shown.append({"name": trial.name, "rows": [_row(one) for one in compared], "figure": figure})
+            shown.append({"name": trial.name, "rows": [_row(comparison) for comparison in compared], "figure": figure})
     return shown
 
 
-def _row(one: OutputComparison) -> dict[str, Any]:
-    digits = 1 if one.kind == "ANGLES" else 2
-    outside = one.outside
+def _row(comparison: OutputComparison) -> dict[str, Any]:
+    digits = 1 if comparison.kind == "ANGLES" else 2
+    outside = comparison.outside
     return {
-        "kind": one.kind,
-        "quantity": f"{one.quantity} ({one.unit})",
-        "side": SIDES[one.side][0],
-        "rms": f"{one.rms:.{digits}f}",
-        "mean": f"{one.mean:+.{digits}f}",
-        "correlation": f"{one.correlation:.2f}",
+        "kind": comparison.kind,
+        "quantity": f"{comparison.quantity} ({comparison.unit})",
+        "side": SIDES[comparison.side][0],
+        "rms": f"{comparison.rms:.{digits}f}",
+        "mean": f"{comparison.mean:+.{digits}f}",
+        "correlation": f"{comparison.correlation:.2f}",
         "outside": "" if outside is None else f"{100.0 * outside:.0f}",
-        "beyond": "" if one.beyond is None else "yes" if one.beyond else "no",
+        "beyond": "" if comparison.beyond is None else "yes" if comparison.beyond else "no",
     }

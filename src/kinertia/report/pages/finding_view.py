@@ -70,8 +70,10 @@ class Card:
     @property
     def measured(self) -> list[Measured]:
         """Evidence, one entry for each finding that has any."""
-        each = [Measured(place_text(one.where), tuple(evidence_texts(one))) for one in self.group.findings]
-        return [one for one in each if one.quantities]
+        measured = [
+            Measured(place_text(finding.where), tuple(evidence_texts(finding))) for finding in self.group.findings
+        ]
+        return [place for place in measured if place.quantities]
 
 
 @dataclass(frozen=True)
@@ -83,17 +85,17 @@ class FindingView:
     @cached_property
     def findings(self) -> list[Finding]:
         """All findings, the worst first."""
-        return in_order(one for overview in self.overviews for one in overview.findings)
+        return in_order(finding for overview in self.overviews for finding in overview.findings)
 
     def _cards(self, severity: Severity) -> list[Card]:
-        top = [one for one in self.findings if one.muted_by is None and one.status != "ignored"]
-        groups = grouped(one for one in top if one.severity is severity)
+        top = [finding for finding in self.findings if finding.muted_by is None and finding.status != "ignored"]
+        groups = grouped(finding for finding in top if finding.severity is severity)
         return [Card(group, self._explained(group.findings)) for group in groups]
 
     def _explained(self, causes: Sequence[Finding]) -> tuple[Group, ...]:
         """Return the findings that equal causes explain; each of several models explains its own."""
-        own = next(overview.findings for overview in self.overviews if causes[0] in overview.findings)
-        return tuple(grouped(consequences(own, causes)))
+        findings = next(overview.findings for overview in self.overviews if causes[0] in overview.findings)
+        return tuple(grouped(consequences(findings, causes)))
 
     @cached_property
     def sections(self) -> list[tuple[str, list[Card]]]:
@@ -104,7 +106,7 @@ class FindingView:
     @cached_property
     def corrections(self) -> list[Correction]:
         """Apparent errors that a reader or the estimate has corrected."""
-        return [_correction(one, self._explained([one])) for one in self._top(Severity.CORRECTED)]
+        return [_correction(finding, self._explained([finding])) for finding in self._top(Severity.CORRECTED)]
 
     @cached_property
     def notes(self) -> list[tuple[Group, str]]:
@@ -112,17 +114,17 @@ class FindingView:
         alike: dict[tuple[str, str], list[Group]] = {}
         for group in grouped(self._top(Severity.INFO)):
             alike.setdefault((group.first.code, group.message), []).append(group)
-        places = (list(filter(None, (each.first.place for each in groups))) for groups in alike.values())
+        places = (list(filter(None, (similar.first.place for similar in groups))) for groups in alike.values())
         return [(groups[0], first_few(names)) for groups, names in zip(alike.values(), places, strict=True)]
 
     def _top(self, severity: Severity) -> list[Finding]:
-        return [one for one in self.findings if one.severity is severity and one.is_open]
+        return [finding for finding in self.findings if finding.severity is severity and finding.is_open]
 
     @cached_property
     def ignored(self) -> str:
         """Codes that the user ignores, how often they were found, and the reason; empty without any."""
-        found = [one for one in self.findings if one.status == "ignored" and one.muted_by is None]
-        codes, reasons = [one.code for one in found], {one.code: one.reason for one in found}
+        found = [finding for finding in self.findings if finding.status == "ignored" and finding.muted_by is None]
+        codes, reasons = [finding.code for finding in found], {finding.code: finding.reason for finding in found}
         return ", ".join(f"{code} ({codes.count(code)}{f': {why}' if why else ''})" for code, why in reasons.items())
 
     @cached_property
@@ -134,14 +136,14 @@ class FindingView:
     @cached_property
     def rules(self) -> list[Rule]:
         """Rules of all codes on the page, to be explained there."""
-        shown_ = [one for one in self.findings if one.status != "ignored"]
-        return [rule(code) for code in sorted({one.code for one in shown_})]
+        shown_ = [finding for finding in self.findings if finding.status != "ignored"]
+        return [rule(code) for code in sorted({finding.code for finding in shown_})]
 
 
-def _correction(one: Finding, explained: tuple[Group, ...]) -> Correction:
-    what = one.name.removesuffix("-corrected").replace("-", " ")
-    size = next((evidence_text(one, name, signed=True) for name in one.evidence), "")
-    return Correction(one, place_text(one.where, with_trial=True) or "all trials", what, size, explained)
+def _correction(finding: Finding, explained: tuple[Group, ...]) -> Correction:
+    what = finding.name.removesuffix("-corrected").replace("-", " ")
+    size = next((evidence_text(finding, name, signed=True) for name in finding.evidence), "")
+    return Correction(finding, place_text(finding.where, with_trial=True) or "all trials", what, size, explained)
 
 
 def place_text(where: Where, with_trial: bool = False) -> str:
@@ -153,19 +155,19 @@ def place_text(where: Where, with_trial: bool = False) -> str:
     return f"{trial}: {place}" if trial and place else trial or place
 
 
-def evidence_texts(one: Finding) -> list[str]:
+def evidence_texts(finding: Finding) -> list[str]:
     """List every quantity of a finding, "level -23 N (limit 15 N)"; words only if message and remedy lack them."""
-    named = [name for name, each in one.evidence.items() if not _is_said(one, each)]
-    return [f"{outlined('{' + name + '}', '{}')} {evidence_text(one, name)}" for name in named]
+    named = [name for name, quantity in finding.evidence.items() if not _is_said(finding, quantity)]
+    return [f"{outlined('{' + name + '}', '{}')} {evidence_text(finding, name)}" for name in named]
 
 
-def _is_said(one: Finding, quantity: Quantity) -> bool:
-    return isinstance(quantity.value, str) and quantity.value in f"{one.message} {one.remedy}"
+def _is_said(finding: Finding, quantity: Quantity) -> bool:
+    return isinstance(quantity.value, str) and quantity.value in f"{finding.message} {finding.remedy}"
 
 
-def evidence_text(one: Finding, name: str, signed: bool = False) -> str:
+def evidence_text(finding: Finding, name: str, signed: bool = False) -> str:
     """Format a quantity as in the message, with its SD, limit and usual range."""
-    quantity, style = one.evidence[name], _style(one.rule.message, name)
+    quantity, style = finding.evidence[name], _style(finding.rule.message, name)
     plain = style.replace("+", "")
 
     def read(value: float) -> str:
@@ -215,8 +217,8 @@ def digest(overview: Overview, windows: Mapping[str, Sequence[Span]]) -> dict[st
         overview: summary of the findings.
         windows: used parts (s) of each trial by its name, the longest first.
     """
-    shown_ = [one for one in overview.findings if one.severity > Severity.INFO and one.muted_by is None]
-    groups = grouped(in_order(one for one in shown_ if one.status != "ignored"))
+    shown_ = [finding for finding in overview.findings if finding.severity > Severity.INFO and finding.muted_by is None]
+    groups = grouped(in_order(finding for finding in shown_ if finding.status != "ignored"))
     return {
         "verdict": overview.verdict,
         "line": overview.line,
@@ -235,5 +237,5 @@ def _in_short(group: Group, windows: Mapping[str, Sequence[Span]]) -> dict[str, 
         "message": group.message,
         "remedy": first.remedy,
         "reason": first.reason,
-        "settings": [one.to_dict() for one in remedies(group.findings, windows) if first.is_open],
+        "settings": [remedy.to_dict() for remedy in remedies(group.findings, windows) if first.is_open],
     }

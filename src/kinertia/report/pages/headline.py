@@ -69,20 +69,22 @@ def words(fit: Fit) -> Words:
 
 def impossible(fit: Fit) -> bool:
     """Return whether an impossible body was estimated, which no simulation accepts."""
-    return any(one.code == IMPOSSIBLE and one.severity is Severity.ERROR for one in fit.findings)
+    return any(finding.code == IMPOSSIBLE and finding.severity is Severity.ERROR for finding in fit.findings)
 
 
 def purposes(outputs: Sequence[Suitability], no_body: bool) -> tuple[Purpose, ...]:
     """Rate three purposes by the five outputs: joint moments, parameters in print, next steps in OpenSim."""
-    of = {one.output: one for one in outputs}
-    moments, motion = of["joint moments"], of["motion"]
-    segments = [of[name] for name in ("segment masses", "centres of mass", "moments of inertia")]
-    uses = {one.use for one in segments}
-    by_use = [f"{use}: {', '.join(one.output for one in segments if one.use == use)}" for use in USES if use in uses]
-    codes = dict.fromkeys(code for one in segments for code in one.codes)
+    by_name = {rating.output: rating for rating in outputs}
+    moments, motion = by_name["joint moments"], by_name["motion"]
+    segments = [by_name[name] for name in ("segment masses", "centres of mass", "moments of inertia")]
+    uses = {rating.use for rating in segments}
+    by_use = [
+        f"{use}: {', '.join(rating.output for rating in segments if rating.use == use)}" for use in USES if use in uses
+    ]
+    codes = dict.fromkeys(code for rating in segments for code in rating.codes)
     by_use += [f"see {', '.join(codes)}"] if codes else []
     parameters = segments[0] if len(uses) == 1 else Suitability("", WITH_CARE, "; ".join(by_use))
-    worse = max((moments, motion), key=lambda one: USES.index(one.use))
+    worse = max((moments, motion), key=lambda rating: USES.index(rating.use))
     opensim = Purpose("Next OpenSim step (RRA, CMC)", worse.use, worse.reason)
     if no_body:
         opensim = opensim._replace(use=DO_NOT_USE, reason=f"a segment is physically impossible; see {IMPOSSIBLE}")
@@ -96,10 +98,10 @@ def purposes(outputs: Sequence[Suitability], no_body: bool) -> tuple[Purpose, ..
 def without_repetition(rated: Sequence[Purpose], said: str) -> list[Purpose]:
     """Leave out of the reasons what the report states elsewhere, and what another purpose has stated."""
     result: list[Purpose] = []
-    for one in rated:
-        like = next((other for other in rated[: len(result)] if other.reason == one.reason), None)
-        reason = one.reason.removeprefix(f"{said}; ") if like is None else f"as {like.name.lower()}"
-        result.append(one._replace(reason=reason))
+    for purpose in rated:
+        like = next((other for other in rated[: len(result)] if other.reason == purpose.reason), None)
+        reason = purpose.reason.removeprefix(f"{said}; ") if like is None else f"as {like.name.lower()}"
+        result.append(purpose._replace(reason=reason))
     return result
 
 
@@ -107,8 +109,8 @@ def _motion(fit: Fit, trial: TrialFit) -> list[str]:
     before, after = (1e3 * rms(trial.marker_errors_m[stage]) for stage in ("ik", "final"))
     change = motion_change(trial)
     angles = np.flatnonzero(fit.skeleton.rotational)
-    each = np.degrees([rms(change[:, k]) for k in angles])
-    worst = int(np.nanargmax(each))
+    by_angle = np.degrees([rms(change[:, k]) for k in angles])
+    worst = int(np.nanargmax(by_angle))
     name = title_of(fit.skeleton, int(angles[worst]))
     moved = 1e3 * np.linalg.norm(change[:, :3], axis=1)
     overall = float(np.degrees(rms(change[:, angles])))
@@ -116,7 +118,7 @@ def _motion(fit: Fit, trial: TrialFit) -> list[str]:
         f"{trial.name}: model and measured markers are {before:.1f} mm (RMS) apart by inverse kinematics and "
         f"{after:.1f} mm by the estimate",
         f"{trial.name}: joint angles were changed by {overall:.1f} degrees (RMS), most of all {name} by "
-        f"{each[worst]:.1f}; the pelvis was moved by {rms(moved):.0f} mm (RMS), {np.nanmax(moved):.0f} mm at most",
+        f"{by_angle[worst]:.1f}; the pelvis was moved by {rms(moved):.0f} mm (RMS), {np.nanmax(moved):.0f} mm at most",
     ]
 
 
@@ -137,7 +139,7 @@ def _knowledge(fit: Fit) -> tuple[str, ...]:
     ]
     masses = {fit.estimate.segments[i]: evidence(posterior.information[i, 0]) for i in estimated_rows(fit)}
     for word, meaning in _EVIDENCE.items():
-        if names := [name for name, one in masses.items() if one == word]:
+        if names := [name for name, knowledge in masses.items() if knowledge == word]:
             sentences.append(f"masses {meaning}: {_segments(names)}")
     if kept := held_sentence(fit):
         sentences.append(kept)

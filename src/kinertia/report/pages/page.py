@@ -114,8 +114,8 @@ def render(
         asymmetry=asymmetry_sentences(fit),
         total_mass=[fit.subject.mass_kg, fit.literature.total_mass_kg, fit.estimate.total_mass_kg],
         cycle=_cycle(fit, norms, curves),
-        more_cycles=[(task, _cycle(own, norms, curves)) for task, own in list(fits_by_task(fit).items())[1:]],
-        phases=[_phase(one) for one in phase_figures(fit, curves, legs=True)],
+        more_cycles=[(task, _cycle(task_fit, norms, curves)) for task, task_fit in list(fits_by_task(fit).items())[1:]],
+        phases=[_phase(figures) for figures in phase_figures(fit, curves, legs=True)],
         convention=convention_of(fit),
         about=_about(fit, provenance),
         sides={side: name for side, (_, name) in SIDE_COLOURS.items()},
@@ -182,14 +182,14 @@ def _cycle(fit: Fit, norms: Norms, curves: CurvesByStage | None) -> dict[str, An
     if not figures:
         return None
     clinical, profile = figures.pop("clinical", None), profile_view(fit, norms)
-    own = main_task(fit)
-    names = {trial.name for trial in own.trials if trial.joint_curves is not None}
-    estimate = (curves or drawn_curves(own))["estimate"]
-    strides = [stride for trial in own.trials for stride in trial.strides]
+    fit_of_task = main_task(fit)
+    names = {trial.name for trial in fit_of_task.trials if trial.joint_curves is not None}
+    estimate = (curves or drawn_curves(fit_of_task))["estimate"]
+    strides = [stride for trial in fit_of_task.trials for stride in trial.strides]
     return {
-        "rows": stride_rows(own),
-        "peaks": peak_rows([one for one in estimate if one.trial in names]),
-        "trials": [trial.name for trial in own.trials],
+        "rows": stride_rows(fit_of_task),
+        "peaks": peak_rows([curve for curve in estimate if curve.trial in names]),
+        "trials": [trial.name for trial in fit_of_task.trials],
         "norms": bool(norms),
         "profile": profile,
         "map": None if profile is None else written(map_figure(profile)),
@@ -201,17 +201,17 @@ def _cycle(fit: Fit, norms: Norms, curves: CurvesByStage | None) -> dict[str, An
     }
 
 
-def _phase(one: PhaseFigures) -> dict[str, Any]:
+def _phase(figures: PhaseFigures) -> dict[str, Any]:
     """Collect everything that the templates show of the stances or landings of one task."""
-    shown = dict.fromkeys((curve.trial, curve.stride) for curve in one.curves)
+    shown = dict.fromkeys((curve.trial, curve.stride) for curve in figures.curves)
     return {
-        "id": f"{one.phase}-{one.task}",
-        "phase": one.phase,
-        "task": one.task,
+        "id": f"{figures.phase}-{figures.task}",
+        "phase": figures.phase,
+        "task": figures.task,
         "trials": list(dict.fromkeys(trial for trial, _ in shown)),
         "count": len(shown),
-        "peaks": peak_rows(one.curves) if one.phase == "landing" else [],
-        **{kind: written(figure) for kind, figure in one.figures.items()},
+        "peaks": peak_rows(figures.curves) if figures.phase == "landing" else [],
+        **{kind: written(figure) for kind, figure in figures.figures.items()},
     }
 
 
@@ -349,8 +349,8 @@ def profile_view(fit: Fit, norms: Mapping[str, Norm]) -> ProfileView | None:
         return None
     profile = gait_profile(fit, norms)
     rows = [
-        ScoreRow(one.title, *(_degrees(profile.gvs_deg[quantity, side]) for side in FEET))
-        for quantity, one in CLINICAL_ANGLES.items()
+        ScoreRow(title.title, *(_degrees(profile.gvs_deg[quantity, side]) for side in FEET))
+        for quantity, title in CLINICAL_ANGLES.items()
     ]
     rows.append(ScoreRow("Gait Profile Score", *(_degrees(profile.gps_deg[side]) for side in FEET)))
     return ProfileView(tuple(rows), _degrees(profile.overall_deg), profile.norm_people, profile.remarks)

@@ -237,14 +237,17 @@ def render_plan(planned: Plan) -> str:
     words = {"measured": "measured", "informed": "informed", "assumed": "assumed (the literature's)"}
     bars = bar_figure(
         names,
-        {title: [one[word] for one in counts] for word, title in words.items()},
+        {title: [counted[word] for counted in counts] for word, title in words.items()},
         "How many parameters each recording would inform well, partly and not at all.",
         "body segment parameters",
     )
     shares = [_shares(planned, chosen) for chosen in planned.sd]
     dots = dot_figure(
         names,
-        {what: {"error bar as a share of the literature's": [one[what] for one in shares]} for what in _CLASSES},
+        {
+            what: {"error bar as a share of the literature's": [by_class[what] for by_class in shares]}
+            for what in _CLASSES
+        },
         "Predicted error bars over those of the literature, mean by class, for each recording.",
     )
     parts = [
@@ -273,8 +276,8 @@ def save_plan(planned: Plan, folder: str | Path) -> Path:
     return Path(folder)
 
 
-def _values(one: Explained) -> tuple[float, ...]:
-    return one.objective, one.force_rms_n, one.moment_rms_nm, 1e3 * one.marker_rms_m
+def _values(explained: Explained) -> tuple[float, ...]:
+    return explained.objective, explained.force_rms_n, explained.moment_rms_nm, 1e3 * explained.marker_rms_m
 
 
 def crossval_rows(held_out: Sequence[HeldOut], before: str) -> list[list[str]]:

@@ -174,8 +174,8 @@ def variants_rows(tables: Mapping[str, Table1]) -> list[list[str]]:
 
 def _row(title: str, draws: int, errors: Callable[[str], Errors], shares: Iterable[float], factor: float) -> list[str]:
     noisy, clean = ([asdict(errors(condition)) for condition in conditions] for conditions in (NOISY, _CLEAN))
-    pairs = [[each[name] for each in noisy] for _, name, _ in QUANTITIES.values()]
-    pairs.append([each["inertia_rms_kgm2"] for each in clean])
+    pairs = [[errors_by_name[name] for errors_by_name in noisy] for _, name, _ in QUANTITIES.values()]
+    pairs.append([errors_by_name["inertia_rms_kgm2"] for errors_by_name in clean])
     *with_noise, exact = (" / ".join(short(value, 2) for value in pair) for pair in pairs)
     return [title, str(draws), *with_noise, ", ".join(f"{100 * s:.0f}" for s in shares), exact, f"{factor:.2f}"]
 
@@ -216,8 +216,10 @@ def variants_figure(tables: Mapping[str, Table1]) -> Figure:
 def _along(paths: Sequence[np.ndarray], columns: slice) -> np.ndarray:
     """Return the geometric mean (k,) over paths of errors (k, 49) of the RMS over a class; stopped paths stay as is."""
     errors = [[rms(wrong.reshape(-1, 7)[:, columns]) for wrong in path] for path in paths]
-    longest = max(len(each) for each in errors)
-    mean: np.ndarray = np.exp(np.log([np.pad(each, (0, longest - len(each)), "edge") for each in errors]).mean(axis=0))
+    longest = max(len(curve) for curve in errors)
+    mean: np.ndarray = np.exp(
+        np.log([np.pad(curve, (0, longest - len(curve)), "edge") for curve in errors]).mean(axis=0)
+    )
     return mean
 
 

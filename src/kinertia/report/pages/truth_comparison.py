@@ -51,7 +51,7 @@ class Truth:
         IK + ID uses measured motion, literature BSPs, and forces as measured.
         """
         before, after = (self._moments_off(fit, stage) for stage in ("literature", "estimate"))
-        return {joint: (rms(before[:, own]), rms(after[:, own])) for joint, own in _columns(fit).items()}
+        return {joint: (rms(before[:, columns]), rms(after[:, columns])) for joint, columns in _columns(fit).items()}
 
     def moment_intervals(self, fit: Fit) -> dict[str, tuple[float, float]]:
         """Return per joint the median half-width (N m) of the 95 % intervals, and the share that holds the truth.
@@ -63,8 +63,8 @@ class Truth:
             return {}
         half, off = INTERVAL_SD * np.concatenate(deviations), np.abs(self._moments_off(fit, "estimate"))
         return {
-            joint: (float(np.median(half[:, own])), float(np.mean(off[:, own] <= half[:, own])))
-            for joint, own in _columns(fit).items()
+            joint: (float(np.median(half[:, columns])), float(np.mean(off[:, columns] <= half[:, columns])))
+            for joint, columns in _columns(fit).items()
         }
 
     def _moments_off(self, fit: Fit, stage: str) -> np.ndarray:

@@ -58,7 +58,7 @@ class ViconPoints:
     def at(cls, outputs: FileOutputs, time: np.ndarray) -> Self:
         """Take the points at the frames nearest to these times (f,)."""
         rows = nearest_samples(outputs.time, time)
-        return cls({name: each[rows] for name, each in outputs.points.items()})
+        return cls({name: points[rows] for name, points in outputs.points.items()})
 
     def centre(self, joint: BodyJoint) -> np.ndarray | None:
         """Return a joint's centre (f, 3); None if the file lacks it."""
@@ -72,10 +72,10 @@ class ViconPoints:
             ours: (f, 3, 3) Kinertia's axes of the segment in columns.
         """
         segment = joint.side.upper() + _SEGMENTS[joint.name]
-        own = [self.points.get(segment + letter) for letter in "O" + _DIRECTIONS]
-        if any(point is None for point in own):
+        corners = [self.points.get(segment + letter) for letter in "O" + _DIRECTIONS]
+        if any(point is None for point in corners):
             return None
-        origin, *ends = (np.asarray(point) for point in own)
+        origin, *ends = (np.asarray(point) for point in corners)
         found = np.stack([end - origin for end in ends], axis=2)
         found = found / np.linalg.norm(found, axis=1, keepdims=True)
         alike = np.nanmean(np.einsum("fki,fkj->fij", ours, found), axis=0)
@@ -123,18 +123,18 @@ def moment_differences(fit: Fit, trial: TrialFit) -> Iterator[MomentDifference]:
     if curve is None or stated is None:
         return
     outputs = outputs_of(fit, trial, "plug-in-gait", correlated=False)
-    found = {(one.joint, one.side): one for one in outputs if one.kind == "MOMENTS"}
+    found = {(output.joint, output.side): output for output in outputs if output.kind == "MOMENTS"}
     force_n = measured_reactions(trial.kinematics).at(curve.time)[:, :, 1]
     inside = np.isin(np.round(curve.time, 6), np.round(trial.time, 6))
     others, apart = _as_vicon(fit, trial, ViconPoints.at(stated, curve.time))
-    for (joint, side), one in found.items():
-        if one.name not in stated.values:
+    for (joint, side), output in found.items():
+        if output.name not in stated.values:
             continue
-        theirs = stated.values[one.name] / moment_divisor(stated, one.kind, fit.mass_kg)
+        theirs = stated.values[output.name] / moment_divisor(stated, output.kind, fit.mass_kg)
         theirs = theirs[nearest_samples(stated.time, curve.time)]
         stance = force_n[:, FEET.index(side)] > _LOADED_N
         for row, component in enumerate(COMPONENTS):
-            seen, ours = stance & np.isfinite(theirs[:, row]), _NM * one.values[:, row]
+            seen, ours = stance & np.isfinite(theirs[:, row]), _NM * output.values[:, row]
             yield MomentDifference(
                 trial.name,
                 joint,
@@ -144,7 +144,7 @@ def moment_differences(fit: Fit, trial: TrialFit) -> Iterator[MomentDifference]:
                 inside[seen],
                 theirs[seen, row],
                 ours[seen],
-                _NM * one.sd[seen, row],
+                _NM * output.sd[seen, row],
                 {name: values[joint, side][seen, row] for name, values in others.items()},
                 _slow(curve.time, ours - theirs[:, row], trial.motion_hz)[seen],
                 *apart[joint, side],
@@ -157,7 +157,9 @@ def _as_vicon(
     """Return moments (f, 3) N m/kg by what is Vicon's, joint and side; and how far centres (mm) and axes (deg) are."""
     curve, skeleton = trial.joint_curves, trial.skeleton
     assert curve is not None
-    corrected, measured = (each.at(curve.time) for each in (trial.reactions, measured_reactions(trial.kinematics)))
+    corrected, measured = (
+        reactions.at(curve.time) for reactions in (trial.reactions, measured_reactions(trial.kinematics))
+    )
     joints = leg_joints(skeleton)
     whole, raw, tables = (
         joint_wrenches(skeleton, body, curve.motion, loads, joints)
@@ -179,8 +181,8 @@ def _as_vicon(
             wrench = wrenches[joint]
             moment = wrench[:, 3:] + np.cross(at - about, wrench[:, :3])
             moment = np.einsum("nka,nk->na", along[:, :, _RIGHT_FORWARD_UP], moment)
-            own = result.setdefault(name, {})
-            own[joint.name, joint.side] = -component_signs(joint) * moment / fit.mass_kg
+            moments = result.setdefault(name, {})
+            moments[joint.name, joint.side] = -component_signs(joint) * moment / fit.mass_kg
         apart[joint.name, joint.side] = _apart(at - centre, ours, axes)
     return result, apart
 
@@ -243,7 +245,7 @@ class CurveDifference:
         """Judge one component over the trials that show it; None with fewer than ten frames."""
         first = parts[0]
         ours, theirs, sd, slow = (
-            np.concatenate([getattr(one, name) for one in parts]) for name in ("ours", "vicon", "sd", "slow")
+            np.concatenate([getattr(part, name) for part in parts]) for name in ("ours", "vicon", "sd", "slow")
         )
         known = np.isfinite(ours) & np.isfinite(slow)
         if known.sum() < _FEWEST:
@@ -252,7 +254,7 @@ class CurveDifference:
         bars = rms / (INTERVAL_SD * _rms(sd[known])) if np.isfinite(sd[known]).all() else np.nan
         shares = {"filter": 1.0 - (_rms(slow[known]) / max(rms, 1e-12)) ** 2}
         for name in ("centre", "axes", "forces", "tables", "all"):
-            other = np.concatenate([one.others[name] for one in parts])
+            other = np.concatenate([part.others[name] for part in parts])
             both = known & np.isfinite(other)
             if both.sum() >= _FEWEST:
                 shares[name] = 1.0 - (_rms((other - theirs)[both]) / max(_rms((ours - theirs)[both]), 1e-12)) ** 2
@@ -265,7 +267,7 @@ class CurveDifference:
             cause, explained = best, shares[best]
         elif together > _MOST_OF_IT:
             cause, explained = "together", together
-        apart = (_rms(np.array([getattr(one, name) for one in parts])) for name in ("apart_mm", "apart_deg"))
+        apart = (_rms(np.array([getattr(part, name) for part in parts])) for name in ("apart_mm", "apart_deg"))
         return cls(first.joint, first.side, first.component, rms, bars, cause, explained, "centre" in shares, *apart)
 
 
@@ -273,21 +275,21 @@ def curve_differences(fit: Fit) -> list[CurveDifference]:
     """Return how far each moment curve is from Vicon's, over all trials whose files hold them."""
     found: dict[tuple[str, str, str], list[MomentDifference]] = {}
     for trial in fit.trials:
-        for one in moment_differences(fit, trial):
-            found.setdefault((one.joint, one.component, one.side), []).append(one)
+        for difference in moment_differences(fit, trial):
+            found.setdefault((difference.joint, difference.component, difference.side), []).append(difference)
     judged = (CurveDifference.of(parts) for parts in found.values())
-    return [one for one in judged if one is not None]
+    return [difference for difference in judged if difference is not None]
 
 
 def corrections(fit: Fit) -> str:
     """List the clear gains and delays that the fit has corrected, which Vicon has not; empty if there are none."""
     found = []
-    for one in () if fit.posterior is None else fit.posterior.calibration:
-        if one.sd and abs(one.value) > _CLEAR_SD * one.sd:
-            if one.quantity == GAIN:
-                found.append(f"{one.plate} {100.0 * one.value:+.1f} %")
-            elif one.quantity == DELAY and one.trial is not None:  # the clock's own part is in it
-                found.append(f"delay {1e3 * one.value:.1f} ms")
+    for entry in () if fit.posterior is None else fit.posterior.calibration:
+        if entry.sd and abs(entry.value) > _CLEAR_SD * entry.sd:
+            if entry.quantity == GAIN:
+                found.append(f"{entry.plate} {100.0 * entry.value:+.1f} %")
+            elif entry.quantity == DELAY and entry.trial is not None:  # the clock's own part is in it
+                found.append(f"delay {1e3 * entry.value:.1f} ms")
     return ", ".join(dict.fromkeys(found))
 
 
@@ -306,31 +308,35 @@ def differences_view(fit: Fit) -> dict[str, Any] | None:
     """Return the content of the report's table: a row per component of each joint's moment; None without curves."""
     found = curve_differences(fit)
     rows = []
-    for joint, component in dict.fromkeys((one.joint, one.component) for one in found):
-        own = [one for one in found if (one.joint, one.component) == (joint, component)]
-        row = {"curve": f"{joint} {component}", "cause": _causes(own)}
-        for one in own:
-            row[one.side] = f"{one.rms:.2f}" + (f" ({one.bars:.1f})" if np.isfinite(one.bars) else "")
+    for joint, component in dict.fromkeys((difference.joint, difference.component) for difference in found):
+        of_curve = [
+            difference for difference in found if (difference.joint, difference.component) == (joint, component)
+        ]
+        row = {"curve": f"{joint} {component}", "cause": _causes(of_curve)}
+        for difference in of_curve:
+            row[difference.side] = f"{difference.rms:.2f}" + (
+                f" ({difference.bars:.1f})" if np.isfinite(difference.bars) else ""
+            )
         rows.append(row)
-    tried = all(one.tried for one in found)
+    tried = all(difference.tried for difference in found)
     return {"rows": rows, "tried": tried, "corrected": corrections(fit)} if found else None
 
 
 def _causes(sides: Sequence[CurveDifference]) -> str:
     """State the likely causes on both sides, with the size of what differs."""
-    beyond = [one for one in sides if one.cause != "within"]
+    beyond = [difference for difference in sides if difference.cause != "within"]
     texts = []
-    for cause in dict.fromkeys(one.cause for one in beyond):
-        own = [one for one in beyond if one.cause == cause]
-        whose = "" if len(own) == len(sides) else f"{SIDES[own[0].side][0]}: "
-        texts.append(whose + _cause(cause, own))
+    for cause in dict.fromkeys(difference.cause for difference in beyond):
+        of_cause = [difference for difference in beyond if difference.cause == cause]
+        whose = "" if len(of_cause) == len(sides) else f"{SIDES[of_cause[0].side][0]}: "
+        texts.append(whose + _cause(cause, of_cause))
     return "; ".join(texts) or "within the error bars"
 
 
 def _cause(cause: str, sides: Sequence[CurveDifference]) -> str:
     joint = sides[0].joint
     if cause == "centre":
-        return f"{joint.lower()} centre, {' and '.join(f'{one.apart_mm:.0f}' for one in sides)} mm apart"
+        return f"{joint.lower()} centre, {' and '.join(f'{difference.apart_mm:.0f}' for difference in sides)} mm apart"
     if cause == "axes":
-        return f"{_AXES[joint]}, {' and '.join(f'{one.apart_deg:.0f}' for one in sides)}° apart"
+        return f"{_AXES[joint]}, {' and '.join(f'{difference.apart_deg:.0f}' for difference in sides)}° apart"
     return _WORDS[cause]
