@@ -93,7 +93,7 @@ def show_error(message: str) -> None:
 
 
 def show_problem(error: KinertiaError, prefix: str = "") -> None:
-    """Show one line per finding that stopped something, or for the error; `of` states whose it is among several."""
+    """Show one line per finding that stopped something, or for the error; `prefix` states whose it is among several."""
     also = error.also if isinstance(error, FileError) else ()
     for line in str(error).split("\n") if isinstance(error, BlockedError) else map(str, (error, *also)):
         show_error(f"{prefix}{line}")

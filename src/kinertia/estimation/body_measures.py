@@ -129,11 +129,11 @@ def measured_body(
         PriorError: the package yeadon is missing, or the measurements are impossible for a person.
     """
     expect_yeadon()
-    names = [one.name for one in measures()]
+    names = [measure.name for measure in measures()]
     expected, spread = expected_measures(mass_kg, height_m, mass_sd_kg)
     rows = [(names.index(name), value, sd / value) for name, (value, sd) in stated.items()]
     rows += [(names.index(name), value, _JOINT_LENGTH_SD_M / value) for name, value in lengths_m.items()]
-    places, values, sd = (np.array(each) for each in zip(*rows, strict=True))
+    places, values, sd = (np.array(column) for column in zip(*rows, strict=True))
     seen, noise = np.eye(len(names))[places], np.diag(np.square(sd))
     logs, left = updated(expected, spread, seen, np.log(values), noise)
     implausible = _implausible(stated, seen @ expected, seen @ spread @ seen.T + noise, np.log(values))
@@ -141,8 +141,8 @@ def measured_body(
         return _with_errors(logs, left, lumbar_m, implausible)
     except PriorError as error:
         if implausible:  # the likelier cause, in the words of the form
-            blocking = [one.at(Severity.ERROR) for one in implausible]
-            reasons = "; ".join(one.message for one in blocking[:_FEW])
+            blocking = [finding.at(Severity.ERROR) for finding in implausible]
+            reasons = "; ".join(finding.message for finding in blocking[:_FEW])
             raise PriorError(f"no body has these girths and lengths: {reasons}", found=blocking[0]) from error
         raise
 
@@ -160,12 +160,12 @@ def _implausible(
         if abs(away[k]) > FAR_SD
     ]
     for girth, width in girths_with_widths():
-        one, other = (measures()[place].name for place in (girth, width))
-        if one in stated and other in stated:
-            ratio = stated[one][0] / stated[other][0]
+        girth_name, other = (measures()[place].name for place in (girth, width))
+        if girth_name in stated and other in stated:
+            ratio = stated[girth_name][0] / stated[other][0]
             low, high = GIRTH_OVER_WIDTH
             if not low < ratio < high:
-                measure = f"{one}, as a multiple of {other},"
+                measure = f"{girth_name}, as a multiple of {other},"
                 found.append(_unlike(measure, Quantity(ratio, "1"), Quantity("2 to 3.14"), ratio=Quantity(ratio, "1")))
     return tuple(found)
 
@@ -204,10 +204,10 @@ def _slopes(measures_m: np.ndarray, lumbar_m: float, values: np.ndarray) -> np.n
     Trunk, arm and leg do not depend on one another, so one measurement of each is changed at a time; but the thigh
     begins with the lowest cross-section of the trunk.
     """
-    keys = [one.key for one in measures()]
+    keys = [measure.key for measure in measures()]
     hips = [k for k, key in enumerate(keys) if key.startswith("Ls0")]
     by_part = [[k for k, key in enumerate(keys) if key[1] == part and k not in hips] for part in _KINDS_OF_PART]
-    together = [[k] for k in hips] + [[k for k in each if k is not None] for each in zip_longest(*by_part)]
+    together = [[k] for k in hips] + [[k for k in pair if k is not None] for pair in zip_longest(*by_part)]
     slopes = np.zeros((*values.shape, len(keys)))
     for which in together:
         moved = measures_m.copy()
@@ -229,9 +229,9 @@ def _of_shapes_and_cuts(values: np.ndarray) -> list[np.ndarray]:
         size[k] = _SHAPE_SD * values[k] * extensive
         columns.append(size)
         for j, sd in enumerate((_CENTRE_SD_M, *_MOMENT_SD * values[k, 2:]), start=1):
-            own = np.zeros_like(values)
-            own[k, j] = sd
-            columns.append(own)
+            of_shape = np.zeros_like(values)
+            of_shape[k, j] = sd
+            columns.append(of_shape)
     for distal, proximal, count in _CUTS:
         i, j = KINDS.index(distal), KINDS.index(proximal)
         moved = np.zeros_like(values)
@@ -291,16 +291,16 @@ def with_measures(
     kept = kept[(kept @ seen).any(axis=1)]  # where both sides are prostheses nothing was measured
     seen, values, errors = kept @ seen, kept @ body.values.ravel(), kept @ body.covariance @ kept.T
     # in standard deviations, since kilograms and kg m2 differ in magnitude
-    own, off = prior.sd.ravel(), np.sqrt(np.diag(errors))
+    prior_sd, off = prior.sd.ravel(), np.sqrt(np.diag(errors))
     moved, covariance = updated(
-        np.zeros(len(own)),
-        prior.covariance / np.outer(own, own),
-        seen * own / off[:, None],
+        np.zeros(len(prior_sd)),
+        prior.covariance / np.outer(prior_sd, prior_sd),
+        seen * prior_sd / off[:, None],
         (values - seen @ prior.mean.table().ravel()) / off,
         errors / np.outer(off, off),
     )
-    mean = BodySegmentParameters.from_table(names, prior.mean.table() + (own * moved).reshape(-1, 10))
-    return replace(prior, mean=mean, covariance=covariance * np.outer(own, own)), body
+    mean = BodySegmentParameters.from_table(names, prior.mean.table() + (prior_sd * moved).reshape(-1, 10))
+    return replace(prior, mean=mean, covariance=covariance * np.outer(prior_sd, prior_sd)), body
 
 
 def _with_whole_trunk() -> np.ndarray:

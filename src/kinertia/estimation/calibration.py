@@ -77,7 +77,7 @@ class Adaptation:
         for marker in self.skeleton.markers:
             if marker.label in self.moved_m:
                 squares.setdefault(marker.segment, []).append(self.moved_m[marker.label] ** 2 / 3.0)
-        return {segment: float(np.sqrt(np.mean(each))) for segment, each in squares.items()}
+        return {segment: float(np.sqrt(np.mean(squares_m2))) for segment, squares_m2 in squares.items()}
 
 
 def first_poses(skeleton: Skeleton, trials: Sequence[Trial]) -> list[InverseKinematics]:
@@ -237,7 +237,7 @@ def without_partly_shown(skeleton: Skeleton, poses: Sequence[InverseKinematics],
         names: coordinates that may be locked.
     """
     shown = [{name for name, q in zip(ik.coordinates, ik.q.T, strict=True) if np.isfinite(q).any()} for ik in poses]
-    partly = {name for name in names if any(name in one for one in shown) and not all(name in one for one in shown)}
+    partly = {name for name in names if any(name in seen for seen in shown) and not all(name in seen for seen in shown)}
     beyond: set[str] = set()
     for joint in skeleton.joints:  # parents come first
         if joint.parent in beyond or partly & {axis.coordinate for axis in joint.axes}:

@@ -97,7 +97,7 @@ def with_undisputed_plates(known: InstrumentPrior, errors: Sequence[CalibrationE
     Both signs are equally likely, and the plate is more likely where the file has it. Its position keeps the standard
     deviation of all plates, which then enters the uncertainty of the moments.
     """
-    disputed = {one.axis for one in errors if one.quantity == POSITION and one.contradicted_by == OTHER_SIGN}
+    disputed = {error.axis for error in errors if error.quantity == POSITION and error.contradicted_by == OTHER_SIGN}
     if not disputed:
         return known
     certain = {name: FaultMixture.certain(prior.sd) for name, prior in known.plate.items() if name in disputed}
@@ -144,7 +144,7 @@ def residual_moments_without_offsets_nm(residual: np.ndarray, foot_loads: np.nda
     loads = np.column_stack([foot_loads[..., 1], np.ones(len(residual))])
     both = np.column_stack([residual, residual + 2.0 * free])
     rest = both - loads @ np.linalg.lstsq(loads, both, rcond=None)[0]
-    as_is, turned = (float(each) for each in rest.std(axis=0))
+    as_is, turned = (float(spread_nm) for spread_nm in rest.std(axis=0))
     return as_is, turned
 
 

@@ -272,8 +272,8 @@ class ParameterVector:
     @cached_property
     def _group(self) -> npt.NDArray[np.intp]:
         # (s,) which seven of theta a segment takes
-        own = np.cumsum(~self._is_left) - 1
-        return np.where(self._is_left, own[partners(self.reference.segments)], own)
+        group = np.cumsum(~self._is_left) - 1
+        return np.where(self._is_left, group[partners(self.reference.segments)], group)
 
     @cached_property
     def names(self) -> tuple[str, ...]:

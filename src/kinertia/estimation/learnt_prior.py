@@ -116,29 +116,33 @@ def information_of(fit: Fit) -> PersonInformation:
     if fit.posterior is None:
         raise unusable(name, "estimated by the two-level method, which has no error bars")
     literature = literature_prior(fit.literature)
-    own = population_prior(literature, fit.subject).prior
+    used_prior = population_prior(literature, fit.subject).prior
     # a person whom the plates weigh otherwise is fitted at their mass
-    factor = fit.expected.total_mass_kg / own.mean.total_mass_kg
-    literature, own = (each.at_mass(factor * each.mass_kg, each.mass_sd_kg) for each in (literature, own))
-    if fit.file is not None or not np.allclose(fit.posterior.prior_sd, own.sd, rtol=_OWN_PRIOR):
+    factor = fit.expected.total_mass_kg / used_prior.mean.total_mass_kg
+    literature, used_prior = (
+        prior.at_mass(factor * prior.mass_kg, prior.mass_sd_kg) for prior in (literature, used_prior)
+    )
+    if fit.file is not None or not np.allclose(fit.posterior.prior_sd, used_prior.sd, rtol=_OWN_PRIOR):
         raise unusable(name, "estimated with a prior other than the tables for the built-in model")
-    return person_information(name, literature, own, fit.estimate, fit.posterior.covariance)
+    return person_information(name, literature, used_prior, fit.estimate, fit.posterior.covariance)
 
 
 def person_information(
-    name: str, literature: BspPrior, own: BspPrior, estimate: BodySegmentParameters, covariance: np.ndarray
+    name: str, literature: BspPrior, used_prior: BspPrior, estimate: BodySegmentParameters, covariance: np.ndarray
 ) -> PersonInformation:
     """Extract the information in recordings from an estimate.
 
     Args:
         name: of the person.
         literature: the prior whose standard deviations are the units.
-        own: the prior that the estimate used.
+        used_prior: the prior that the estimate used.
         estimate, covariance: the estimate, and the posterior covariance (10 s, 10 s) of its table.
     """
     sd = literature.sd.ravel()
-    before, posterior = (each / np.outer(sd, sd) for each in (own.covariance, covariance))
-    moved = (estimate.table() - own.mean.table()).ravel() / sd
+    before, posterior = (
+        table_covariance / np.outer(sd, sd) for table_covariance in (used_prior.covariance, covariance)
+    )
+    moved = (estimate.table() - used_prior.mean.table()).ravel() / sd
     # in coordinates in which the estimate's prior is the unit matrix; combinations with next to no information are left
     # out
     root = np.linalg.cholesky(before)
@@ -205,8 +209,11 @@ class LearntPrior:
             PriorError: it was learnt with another model.
         """
         if literature.mean.segments != self.segments:
-            of = f"a group prior of {len(self.segments)} segments ({', '.join(self.segments)})"
-            inputs = {"one": Quantity(of), "other": Quantity(f"a model of {', '.join(literature.mean.segments)}")}
+            group_text = f"a group prior of {len(self.segments)} segments ({', '.join(self.segments)})"
+            inputs = {
+                "one": Quantity(group_text),
+                "other": Quantity(f"a model of {', '.join(literature.mean.segments)}"),
+            }
             found = with_evidence("S405", Where(), inputs)
             raise PriorError.of(found)
         sd = literature.sd.ravel()
@@ -228,10 +235,10 @@ def learn(people: Sequence[PersonInformation]) -> LearntPrior:
         reason = f"its mean and spread need at least {FEWEST_PEOPLE}"
         raise unusable(f"A group of {len(people)}", reason, people=Quantity(len(people), "1", limit=FEWEST_PEOPLE))
     segments = people[0].segments
-    if other := next((one for one in people if one.segments != segments), None):
+    if other := next((person for person in people if person.segments != segments), None):
         raise unusable(other.name, f"estimated with a different model from {people[0].name}")
     # in coordinates in which the literature's people are uncorrelated, so that nothing is nearly singular
-    correlations = np.mean([_correlation(one.literature.covariance) for one in people], axis=0)
+    correlations = np.mean([_correlation(person.literature.covariance) for person in people], axis=0)
     root = np.linalg.cholesky(correlations)
     seen, means = _Seen.of(root, people), _Means.of(root, people)
     anchor = WITHIN * np.eye(len(root))
@@ -274,7 +281,7 @@ class _Means:
     @classmethod
     def of(cls, root: np.ndarray, people: Sequence[PersonInformation]) -> Self:
         """Build the prior from the people's literature values."""
-        with_mass = np.mean([_moments_with_mass(one.literature) for one in people], axis=0)
+        with_mass = np.mean([_moments_with_mass(person.literature) for person in people], axis=0)
         sides = by_side(people[0].segments)
         return cls(
             root,
@@ -288,10 +295,10 @@ class _Means:
 
     def covariance(self, scales: np.ndarray) -> np.ndarray:
         """Return the covariance (k, k) of the mean in the coordinates of `root`."""
-        each = np.empty(len(self.root))
+        row_sd = np.empty(len(self.root))
         for rows, scale in zip(self.blocks, scales, strict=True):
-            each[rows] = np.sqrt(scale)
-        whole = np.linalg.solve(self.root, each[:, None] * np.linalg.cholesky(self.correlation))
+            row_sd[rows] = np.sqrt(scale)
+        whole = np.linalg.solve(self.root, row_sd[:, None] * np.linalg.cholesky(self.correlation))
         return whole @ whole.T
 
     def scales(self, mean: np.ndarray, of_mean: np.ndarray, scales: np.ndarray) -> np.ndarray:
@@ -311,8 +318,8 @@ def _moments_with_mass(literature: BspPrior) -> np.ndarray:
     """Return the matrix (k, k) to relative parameters from those in which radii of gyration are independent of mass."""
     values = literature.mean.table() / literature.sd
     result = np.eye(values.size)
-    for row, each in enumerate(values):
-        result[10 * row + 4 : 10 * row + 10, 10 * row] = each[4:] / each[0]
+    for row, parameters in enumerate(values):
+        result[10 * row + 4 : 10 * row + 10, 10 * row] = parameters[4:] / parameters[0]
     return result
 
 
@@ -326,10 +333,10 @@ class _Seen:
     @classmethod
     def of(cls, root: np.ndarray, people: Sequence[PersonInformation]) -> Self:
         """Transform the people's information to the coordinates x of root x."""
-        values, vectors = np.linalg.eigh([root.T @ one.information @ root for one in people])
+        values, vectors = np.linalg.eigh([root.T @ person.information @ root for person in people])
         most = int((values > _NOTHING * values.max()).sum(axis=1).max())
         roots = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
-        return cls(roots[:, :, len(root) - most :], np.array([root.T @ one.rhs for one in people]))
+        return cls(roots[:, :, len(root) - most :], np.array([root.T @ person.rhs for person in people]))
 
     def mean(self, within: np.ndarray, between: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Compute the group's mean and its covariance, given the spread within the group and of group means."""

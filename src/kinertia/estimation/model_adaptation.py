@@ -52,9 +52,9 @@ def with_elbows_that_bend_forwards(
     loose = skeleton.unbounded(ELBOWS)
     poses = first_poses(loose, trials)
     beyond = {name[-1]: _beyond(skeleton, poses, name) for name in ELBOWS}
-    if not any(each.any() for each in beyond.values()):
+    if not any(angles.any() for angles in beyond.values()):
         return skeleton, poses
-    sides = [side for side, each in beyond.items() if each.size and np.median(each) < -BACKWARDS_RAD]
+    sides = [side for side, angles in beyond.items() if angles.size and np.median(angles) < -BACKWARDS_RAD]
     if sides:
         free = first_poses(loose.free(ARM_ROTATIONS), trials)
         turns = {name: _mean_angle(free, name) for name in ARM_ROTATIONS if name[-1] in sides}
@@ -69,7 +69,7 @@ def elbow_rotations(before: Skeleton, after: Skeleton) -> dict[str, float]:
     """
     names = {side: f"arm_rot_{side}" for side in "rl"}
     rotations = {side: after.locked.get(name, 0.0) - before.locked.get(name, 0.0) for side, name in names.items()}
-    return {side: float(np.angle(np.exp(1j * each))) for side, each in rotations.items() if each != 0.0}
+    return {side: float(np.angle(np.exp(1j * rotation))) for side, rotation in rotations.items() if rotation != 0.0}
 
 
 def _beyond(skeleton: Skeleton, poses: Sequence[InverseKinematics], elbow: str) -> np.ndarray:
@@ -120,7 +120,9 @@ def show_knee_axes(poses: Sequence[InverseKinematics]) -> bool:
         poses: inverse kinematics of the trials with the 27-DOF model.
     """
     excursions = [_least_excursion_rad(ik) for ik in poses]
-    return sum(each > _STRIDE_RAD for each in excursions) > 1 or any(each > _SQUAT_RAD for each in excursions)
+    return sum(excursion > _STRIDE_RAD for excursion in excursions) > 1 or any(
+        excursion > _SQUAT_RAD for excursion in excursions
+    )
 
 
 def _least_excursion_rad(ik: InverseKinematics) -> float:
@@ -135,8 +137,8 @@ def _range_rad(angle: np.ndarray) -> float:
 
 def shows_trunk(skeleton: Skeleton, trial: Trial) -> bool:
     """Decide whether any frame has enough torso markers to determine how it leans and rotates."""
-    own = {marker.label for marker in skeleton.markers if marker.segment == "torso"}
-    seen = trial.markers.seen[:, [label in own for label in trial.markers.labels]]
+    of_trunk = {marker.label for marker in skeleton.markers if marker.segment == "torso"}
+    seen = trial.markers.seen[:, [label in of_trunk for label in trial.markers.labels]]
     return bool((seen.sum(axis=1) >= ENOUGH_TRUNK_MARKERS).any())
 
 
@@ -156,8 +158,8 @@ def with_upright_trunk(skeleton: Skeleton, trial: Trial) -> Trial:
     upright = _facing(rotation[:, :, 0], trial.markers.rate_hz)
     places = [lumbar + upright @ marker.position for marker in VIRTUAL_TRUNK]
     markers = with_positions(trial.markers, [marker.label for marker in VIRTUAL_TRUNK], np.stack(places, axis=1))
-    own = {marker.label: TRUNK_SD_M for marker in VIRTUAL_TRUNK}
-    return replace(trial, markers=markers, virtual_sd_m={**trial.virtual_sd_m, **own})
+    trunk_sd_m = {marker.label: TRUNK_SD_M for marker in VIRTUAL_TRUNK}
+    return replace(trial, markers=markers, virtual_sd_m={**trial.virtual_sd_m, **trunk_sd_m})
 
 
 def with_positions(markers: Markers, labels: Sequence[str], positions: FloatArray) -> Markers:
@@ -173,13 +175,13 @@ def rigid_motion(local: FloatArray, measured: FloatArray) -> tuple[FloatArray, F
     seen = np.asarray(np.isfinite(measured).all(axis=2))
     weight = seen[..., None] / np.maximum(seen.sum(axis=1), 1)[:, None, None]
     shown = np.where(seen[..., None], measured, 0.0)
-    middle, own = (weight * shown).sum(axis=1), (weight * local).sum(axis=1)
-    across = np.einsum("nmi,nmj->nij", weight * (shown - middle[:, None]), local - own[:, None])
+    middle, local_middle = (weight * shown).sum(axis=1), (weight * local).sum(axis=1)
+    across = np.einsum("nmi,nmj->nij", weight * (shown - middle[:, None]), local - local_middle[:, None])
     left, _, right = np.linalg.svd(across)
     handed = np.linalg.det(left @ right)
     left[:, :, 2] *= handed[:, None]
     rotation = left @ right
-    translation = middle - np.einsum("nij,nj->ni", rotation, own)
+    translation = middle - np.einsum("nij,nj->ni", rotation, local_middle)
     few: np.ndarray = seen.sum(axis=1) < 3
     rotation[few], translation[few] = np.nan, np.nan
     return rotation, translation

@@ -70,10 +70,10 @@ class TotalMass:
         Raises:
             PriorError: the objects weighed with the person leave no mass for the person.
         """
-        masses = [(mass_of(one, stated_mass_kg), one.on_scale) for one in attached]
+        masses = [(mass_of(item, stated_mass_kg), item.on_scale) for item in attached]
         body = stated_mass_kg - sum(mass for (mass, _), weighed in masses if weighed)
         if body < min(_LIGHTEST_KG, stated_mass_kg):
-            names = ", ".join(one.name for one in attached if one.on_scale)
+            names = ", ".join(item.name for item in attached if item.on_scale)
             problem = f"weighed with the person (on_scale = true), it leaves {body:.4g} kg of {stated_mass_kg:.4g} kg"
             left = {"left_kg": Quantity(body, "kg"), "name": Quantity(names), "problem": Quantity(problem)}
             found = with_evidence("S406", Where(part=names), left)
@@ -84,7 +84,7 @@ class TotalMass:
 
 def body_sd_kg(stated_mass_kg: float, attached: Sequence[Attached]) -> float:
     """Return the standard deviation of the body's mass due to objects weighed with it, without the scale's error."""
-    variances = [mass_of(one, stated_mass_kg)[1] ** 2 for one in attached if one.on_scale]
+    variances = [mass_of(item, stated_mass_kg)[1] ** 2 for item in attached if item.on_scale]
     return float(sum(variances) ** 0.5)
 
 
@@ -211,7 +211,7 @@ def lacking(subject: Subject, recordings: Sequence[Recording], mass_only: bool =
 
 def _filed(subject: Subject, field: str, recordings: Sequence[Recording]) -> Any:
     """Return the value that the user states, or else the first file that does; no file states the sex."""
-    stated = [getattr(one, field, None) for one in (subject, *recordings)]
+    stated = [getattr(source, field, None) for source in (subject, *recordings)]
     return next((value for value in stated if value is not None), None)
 
 
@@ -230,17 +230,17 @@ def mass_by_force_kg(literature: BodySegmentParameters, foot_loads: np.ndarray, 
     return literature.total_mass_kg * force / (force + float(residual[:, 1].mean()))
 
 
-def estimated_bodies(skeleton: Skeleton, own: BodySegmentParameters) -> set[str]:
+def estimated_bodies(skeleton: Skeleton, filed: BodySegmentParameters) -> set[str]:
     """Select the heaviest body of every group that moves as one; none of a group lighter than `LIGHT_KG` in total.
 
     Args:
         skeleton: with the coordinates locked that no marker determines.
-        own: the model's own parameters, at the mass of the person.
+        filed: the model's own parameters, at the mass of the person.
     """
-    mass = dict(zip(own.segments, own.mass_kg, strict=True))
+    mass = dict(zip(filed.segments, filed.mass_kg, strict=True))
     groups: dict[int, list[str]] = {}
     last_axis_of = dict(zip(skeleton.segments, skeleton.tree.last_axis.tolist(), strict=True))
-    for name in own.segments:
+    for name in filed.segments:
         groups.setdefault(last_axis_of[name], []).append(name)
     heavy = [names for names in groups.values() if sum(mass[name] for name in names) >= LIGHT_KG]
     return {max(names, key=mass.__getitem__) for names in heavy}

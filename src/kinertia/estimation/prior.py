@@ -148,10 +148,10 @@ class BspPrior:
         """Return the prior of a person of the same build with this mass, known to this standard deviation."""
         factor = mass_kg / self.mass_kg
         rows = np.where(np.isin(PARAMETERS, ("com_x", "com_y", "com_z")), 1.0, factor)
-        each = np.tile(rows, len(self.mean.segments))
+        factors = np.tile(rows, len(self.mean.segments))
         mean = BodySegmentParameters.from_table(self.mean.segments, self.mean.table() * rows)
         return replace(
-            self, mean=mean, covariance=self.covariance * np.outer(each, each), mass_kg=mass_kg, mass_sd_kg=sd_kg
+            self, mean=mean, covariance=self.covariance * np.outer(factors, factors), mass_kg=mass_kg, mass_sd_kg=sd_kg
         )
 
     def given_scale(self) -> tuple[np.ndarray, np.ndarray]:
@@ -216,11 +216,11 @@ def inertia_covariance(bsp: BodySegmentParameters) -> np.ndarray:
     order, deviations are measured by the affine-invariant distance of Lee, Wensing and Park (2020, IEEE T-RO 36:182).
     """
     root = np.linalg.cholesky(second_moments(bsp.inertia_kgm2))
-    own = SECOND_MOMENT_SD * np.sqrt(1.0 - COMMON_SHARE)
+    sd = SECOND_MOMENT_SD * np.sqrt(1.0 - COMMON_SHARE)
     changes = [SECOND_MOMENT_SD * np.sqrt(COMMON_SHARE) * np.eye(3)]
     for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)):
         change = np.zeros((3, 3))
-        change[i, j] = change[j, i] = own if i == j else own * np.sqrt(0.5)
+        change[i, j] = change[j, i] = sd if i == j else sd * np.sqrt(0.5)
         changes.append(change)
     columns = []
     for change in changes:
@@ -238,8 +238,8 @@ def with_symmetry(covariance: np.ndarray, segments: tuple[str, ...], correlation
             j = segments.index(f"{segment[:-2]}_l")
             right, left = slice(10 * i, 10 * i + 10), slice(10 * j, 10 * j + 10)
             mirror = np.diag(MIRROR_SIGNS)
-            one, other = np.linalg.cholesky([covariance[right, right], mirror @ covariance[left, left] @ mirror])
-            result[right, left] = correlation * one @ other.T @ mirror
+            right_root, other = np.linalg.cholesky([covariance[right, right], mirror @ covariance[left, left] @ mirror])
+            result[right, left] = correlation * right_root @ other.T @ mirror
             result[left, right] = result[right, left].T
     return result
 

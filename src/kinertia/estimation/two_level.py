@@ -247,9 +247,9 @@ def radius_of_gyration(skeleton: Skeleton, bsp: BodySegmentParameters, windows: 
     Moments divided by it can be summed with forces.
     """
     first = windows[0]
-    one = Motion(first.motion.q[:1], first.motion.qd[:1], first.motion.qdd[:1])
-    _, (mass,) = consistent_root_acceleration(skeleton, bsp, one, first.wrench[:1])
-    about_axes = skeleton.root.axes(one.q)[0].T @ mass[3:, 3:]
+    start = Motion(first.motion.q[:1], first.motion.qd[:1], first.motion.qdd[:1])
+    _, (mass,) = consistent_root_acceleration(skeleton, bsp, start, first.wrench[:1])
+    about_axes = skeleton.root.axes(start.q)[0].T @ mass[3:, 3:]
     return float(np.sqrt(np.trace(about_axes) / 3 / np.linalg.norm(mass[:3, 0])))
 
 

@@ -190,9 +190,9 @@ def profile_changes(
     tables = [[_stride_scores(trial, norms) for trial in trials] for trials in (before, after)]
     found = []
     for side in ("r", "l"):
-        known = [[own for table in some if (own := _values(table, GPS, side)).size] for some in tables]
+        known = [[scores for table in some if (scores := _values(table, GPS, side)).size] for some in tables]
         found.append(_change(GPS, side, known))
-    return tuple(one for one in found if one is not None)
+    return tuple(change for change in found if change is not None)
 
 
 def _stride_scores(trial: TrialFit, norms: Mapping[str, Norm]) -> dict[str, list[object]]:
@@ -209,7 +209,7 @@ def speed_change(before: Sequence[TrialFit], after: Sequence[TrialFit]) -> Chang
 
     One walk against one on a treadmill counts strides instead.
     """
-    known = [[own for trial in trials if (own := _speeds(trial)).size] for trials in (before, after)]
+    known = [[speeds for trial in trials if (speeds := _speeds(trial)).size] for trials in (before, after)]
     return _change(Measure("speed_m_s", "walking", "speed", "m/s"), "", known)
 
 
@@ -219,15 +219,17 @@ def gait_changes(before: Sequence[TrialFit], after: Sequence[TrialFit]) -> tuple
     found = []
     for measure in MEASURES:
         for side in ("r", "l") if measure.sided else ("",):
-            known = [[own for table in some if (own := _values(table, measure, side)).size] for some in tables]
+            known = [
+                [of_table for table in some if (of_table := _values(table, measure, side)).size] for some in tables
+            ]
             found.append(_change(measure, side, known))
-    return tuple(one for one in found if one is not None)
+    return tuple(change for change in found if change is not None)
 
 
 def _values(table: dict[str, list[object]], measure: Measure, side: str) -> np.ndarray:
     values = np.array(table[measure.column], dtype=float)
-    own = np.isfinite(values) & (np.array([side in ("", one) for one in table["side"]], dtype=bool))
-    return np.asarray(values[own])
+    usable = np.isfinite(values) & (np.array([side in ("", table_side) for table_side in table["side"]], dtype=bool))
+    return np.asarray(values[usable])
 
 
 def _change(measure: Measure, side: str, known: Sequence[Sequence[np.ndarray]]) -> Change | None:
@@ -235,10 +237,12 @@ def _change(measure: Measure, side: str, known: Sequence[Sequence[np.ndarray]]) 
     if not all(known):
         return None
     alone = min(map(len, known)) < 2
-    values = [np.concatenate(each) if alone else np.array([own.mean() for own in each]) for each in known]
-    means = [float(each.mean()) for each in values]
-    counts = [len(each) for each in values]
-    spreads = [float(np.std(each, ddof=1)) if len(each) > 1 else np.nan for each in values]
+    values = [
+        np.concatenate(samples) if alone else np.array([sample.mean() for sample in samples]) for samples in known
+    ]
+    means = [float(value.mean()) for value in values]
+    counts = [len(value) for value in values]
+    spreads = [float(np.std(value, ddof=1)) if len(value) > 1 else np.nan for value in values]
     squares = [spread**2 / count for spread, count in zip(spreads, counts, strict=True)]
     sd = float(np.sqrt(sum(squares)))
     freedom = sum(squares) ** 2 / max(sum(s**2 / max(n - 1, 1) for s, n in zip(squares, counts, strict=True)), 1e-300)

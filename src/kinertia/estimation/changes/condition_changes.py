@@ -129,19 +129,19 @@ def conditions_by_outcome(rows: Rows, mask: np.ndarray | None = None) -> dict[st
     found = {
         name: _condition(rows.estimate, rows.drawn, (named == name) & chosen) for name in dict.fromkeys(named.tolist())
     }
-    return {name: one for name, one in found.items() if one.count > 0}
+    return {name: condition for name, condition in found.items() if condition.count > 0}
 
 
 def judged(before: Mapping[str, Condition], after: Mapping[str, Condition], parts: Parts) -> Iterator[Change]:
     """Yield the changes of all outcomes that both conditions show."""
     cells = {name: (before[name], after[name]) for name in before if name in after}
-    for outcome, own in cells.items():
+    for outcome, compared in cells.items():
         quantity, rest, event_side = outcome.split(" ", 2)
         group = f"{quantity} {rest.partition('_')[0]}"
         alike = [other for name, other in cells.items() if name.startswith(f"{group}_") or name.startswith(f"{group} ")]
         event, _, side = event_side.rpartition(" ")
         named = (*named_outcome(f"{quantity} {rest}"), side, event)
-        yield _change(named, own, alike, parts(outcome, *own))
+        yield _change(named, compared, alike, parts(outcome, *compared))
 
 
 def _paired(_: str, before: Condition, after: Condition) -> dict[str, float]:
@@ -191,28 +191,30 @@ def _condition(estimate: np.ndarray, drawn: Mapping[str, np.ndarray], mask: np.n
 
 def _change(
     named: tuple[str, str, str, str, str],
-    own: Sequence[Condition],
+    compared: Sequence[Condition],
     alike: Sequence[Sequence[Condition]],
     measured: Mapping[str, float],
 ) -> Change:
-    before, after = own
+    before, after = compared
     quantity, joint, component, side, event = named
     strides, between, freedom = [], [], []
     usual = USUAL.get(f"{quantity} {joint} {component}", 0.0)
-    for k, one in enumerate(own):
-        others = [each[k] for each in alike if each[k].count > 1]
-        pooled = float(np.mean([each.spread for each in others])) if others else 0.0
-        weight = min(SHRINK, 0.5 * sum(each.count - 1 for each in others if each is not one))
-        if one.count < FEW and usual:
+    for k, condition in enumerate(compared):
+        others = [outcome_conditions[k] for outcome_conditions in alike if outcome_conditions[k].count > 1]
+        pooled = float(np.mean([other.spread for other in others])) if others else 0.0
+        weight = min(SHRINK, 0.5 * sum(other.count - 1 for other in others if other is not condition))
+        if condition.count < FEW and usual:
             pooled, weight = max(pooled, usual**2), SHRINK
-        variance, own_freedom = shrunk(one.spread, one.count, pooled, weight)
+        variance, own_freedom = shrunk(condition.spread, condition.count, pooled, weight)
         strides.append(variance)
         freedom.append(own_freedom)
-        between.append(variance / one.count)
+        between.append(variance / condition.count)
     variances = {**measured, "stride": sum(between)}
     total = sum(variances.values())
-    of_strides = sum(each**2 / own_freedom for each, own_freedom in zip(between, freedom, strict=True))
-    enough = min(one.count for one in own) > 1
+    of_strides = sum(
+        stride_variance**2 / own_freedom for stride_variance, own_freedom in zip(between, freedom, strict=True)
+    )
+    enough = min(condition.count for condition in compared) > 1
     of_sd = (total**2 / of_strides if of_strides > 0.0 else np.inf) if enough else np.nan
     sd = float(np.sqrt(total))
     mdc95, p = shown_from(after.mean - before.mean, sd, of_sd)
@@ -231,5 +233,5 @@ def _change(
         mdc95=mdc95,
         p=p,
         stride_sd=(float(np.sqrt(strides[0])), float(np.sqrt(strides[1]))),
-        assumed=bool(usual) and min(one.count for one in own) < FEW,
+        assumed=bool(usual) and min(condition.count for condition in compared) < FEW,
     )

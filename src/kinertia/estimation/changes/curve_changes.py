@@ -106,10 +106,11 @@ def paired(before: CurveCondition, after: CurveCondition) -> tuple[np.ndarray, S
 def apart(before: CurveCondition, after: CurveCondition) -> tuple[np.ndarray, Sequence[np.ndarray]]:
     """Return the error of a difference of two sessions of one body."""
     of_all, of_body = (
-        sum(one.departures[source].var(axis=0, ddof=1) for one in (before, after)) for source in ("all", "body")
+        sum(condition.departures[source].var(axis=0, ddof=1) for condition in (before, after))
+        for source in ("all", "body")
     )
     shared = (after.departures["shared"] - before.departures["shared"]).var(axis=0, ddof=1)
-    contacts = sum(np.square(one.departures["contacts"]).sum(axis=0) for one in (before, after))
+    contacts = sum(np.square(condition.departures["contacts"]).sum(axis=0) for condition in (before, after))
     return np.maximum(of_all - of_body, 0.0) + shared + contacts, (before.departures["all"], after.departures["all"])
 
 
@@ -124,16 +125,16 @@ def curve_changes(before: Rows, after: Rows, measured: Measured) -> Iterator[Cur
     best: dict[tuple[str, str], str] = {}
     for name, side, phase in first:
         if (name, side, phase) in second:
-            count = min(one[name, side, phase].count for one in (first, second))
+            count = min(condition[name, side, phase].count for condition in (first, second))
             known = best.get((name, side))
-            if known is None or count > min(one[name, side, known].count for one in (first, second)):
+            if known is None or count > min(condition[name, side, known].count for condition in (first, second)):
                 best[name, side] = phase
     random = np.random.default_rng(_SEED)
     for (name, side), phase in best.items():
-        own = first[name, side, phase], second[name, side, phase]
+        compared = first[name, side, phase], second[name, side, phase]
         other = {"r": "l", "l": "r"}.get(side, side)
-        mirrored = [each.get((name, other, best.get((name, other), phase))) for each in (first, second)]
-        yield _compared(name, side, phase, own, mirrored, measured, random)
+        mirrored = [conditions.get((name, other, best.get((name, other), phase))) for conditions in (first, second)]
+        yield _compared(name, side, phase, compared, mirrored, measured, random)
 
 
 def rows_of(rows: Rows, mask: np.ndarray) -> Rows:
@@ -148,8 +149,8 @@ def _conditions(rows: Rows) -> dict[tuple[str, str, str], CurveCondition]:
         named.setdefault((name, side, stride.split()[0]), []).append(row)
     result = {}
     for curve, some in named.items():
-        own = np.array(some)
-        chosen = own[common_strides(rows.estimate[own])]
+        members = np.array(some)
+        chosen = members[common_strides(rows.estimate[members])]
         if len(chosen):
             result[curve] = _condition(rows.estimate[chosen], {s: drawn[:, chosen] for s, drawn in rows.drawn.items()})
     return result
@@ -161,7 +162,10 @@ def _condition(curves: np.ndarray, drawn: Mapping[str, np.ndarray]) -> CurveCond
     spread = np.zeros(len(PERCENT))
     if len(curves) > 1:
         spread = spread_beyond(curves, drawn["all"])
-    departed = {source: own - (0.0 if source == "contacts" else own.mean(axis=0)) for source, own in means.items()}
+    departed = {
+        source: of_source - (0.0 if source == "contacts" else of_source.mean(axis=0))
+        for source, of_source in means.items()
+    }
     return CurveCondition(curves.mean(axis=0), len(curves), departed, residuals, spread)
 
 
@@ -169,24 +173,24 @@ def _compared(
     name: str,
     side: str,
     phase: str,
-    own: tuple[CurveCondition, CurveCondition],
+    compared: tuple[CurveCondition, CurveCondition],
     mirrored: Sequence[CurveCondition | None],
     measured: Measured,
     random: np.random.Generator,
 ) -> CurveChange:
-    before, after = own
+    before, after = compared
     quantity, joint, component = named_outcome(name)
     usual = USUAL.get(f"{quantity} {joint} {component}", 0.0)
     variance, departures = measured(before, after)
-    of_strides, freedom = zip(*(_of_strides(one, usual) for one in own), strict=True)
+    of_strides, freedom = zip(*(_of_strides(condition, usual) for condition in compared), strict=True)
     total = variance + of_strides[0] + of_strides[1]
-    of_each = [one.departures["all"].var(axis=0, ddof=1) for one in own]
-    judged = min(one.count for one in own) > 1
+    of_each = [condition.departures["all"].var(axis=0, ddof=1) for condition in compared]
+    judged = min(condition.count for condition in compared) > 1
     factor = np.nan
     if judged:
         errors = _departed(departures, variance, random)
-        for one, of_one, freely, other in zip(own, of_strides, freedom, mirrored, strict=True):
-            errors = errors + _strayed(one, other, of_one, freely, random)
+        for condition, of_one, freely, other in zip(compared, of_strides, freedom, mirrored, strict=True):
+            errors = errors + _strayed(condition, other, of_one, freely, random)
         with np.errstate(invalid="ignore", divide="ignore"):
             most = np.nanmax(np.where(total > 0.0, np.abs(errors) / np.sqrt(total), 0.0), axis=1)
         factor = float(np.quantile(most, _SHARE))
@@ -207,33 +211,37 @@ def _compared(
     )
 
 
-def _of_strides(one: CurveCondition, usual: float) -> tuple[np.ndarray, float]:
+def _of_strides(condition: CurveCondition, usual: float) -> tuple[np.ndarray, float]:
     """Return the variance (101,) that strides leave in a mean, and its degrees of freedom."""
-    pooled = float(np.nanmean(one.spread)) if np.isfinite(one.spread).any() else 0.0
-    if one.count < FEW:
+    pooled = float(np.nanmean(condition.spread)) if np.isfinite(condition.spread).any() else 0.0
+    if condition.count < FEW:
         pooled = max(pooled, usual**2)
-    variance, freedom = shrunk(one.spread, one.count, pooled, SHRINK)
-    return variance / one.count, freedom
+    variance, freedom = shrunk(condition.spread, condition.count, pooled, SHRINK)
+    return variance / condition.count, freedom
 
 
 def _departed(departures: Sequence[np.ndarray], variance: np.ndarray, random: np.random.Generator) -> np.ndarray:
     """Simulate errors (_SIMULATED, 101) of this variance that vary over the phase as the departures do."""
     mixed = np.zeros((_SIMULATED, len(PERCENT)))
-    for own in departures:
-        mixed += random.standard_normal((_SIMULATED, len(own))) @ (own / np.sqrt(len(own) - 1))
-    found = sum(own.var(axis=0, ddof=1) for own in departures)
+    for departure in departures:
+        mixed += random.standard_normal((_SIMULATED, len(departure))) @ (departure / np.sqrt(len(departure) - 1))
+    found = sum(departure.var(axis=0, ddof=1) for departure in departures)
     return np.asarray(mixed * np.sqrt(variance / np.maximum(found, 1e-300)))
 
 
 def _strayed(
-    one: CurveCondition,
+    condition: CurveCondition,
     mirrored: CurveCondition | None,
     variance: np.ndarray,
     freedom: float,
     random: np.random.Generator,
 ) -> np.ndarray:
     """Simulate deviations (_SIMULATED, 101) of this variance, mixed from those of strides of both sides."""
-    shapes = [own.residuals for own in (one, mirrored) if own is not None and own.count > 1]
+    shapes = [
+        side_condition.residuals
+        for side_condition in (condition, mirrored)
+        if side_condition is not None and side_condition.count > 1
+    ]
     mixed = np.concatenate(shapes)
     mixed = np.where(np.isfinite(mixed), mixed, 0.0)
     mixed = mixed / np.maximum(np.sqrt(np.square(mixed).sum(axis=0)), 1e-300)

@@ -57,18 +57,18 @@ def group_changes(people: Mapping[str, Sequence[Change]]) -> tuple[GroupChange, 
     """Average the changes of each outcome over the people who have it, in the order of their first appearance."""
     outcomes: dict[Names, list[Change]] = {}
     for changes in people.values():
-        for one in changes:
-            if not one.doubt:
-                outcomes.setdefault(one.names, []).append(one)
+        for change in changes:
+            if not change.doubt:
+                outcomes.setdefault(change.names, []).append(change)
     return tuple(_averaged(names, some) for names, some in outcomes.items())
 
 
 def _averaged(names: Names, some: Sequence[Change]) -> GroupChange:
     from scipy import stats  # loaded when it is needed
 
-    differences = np.array([one.difference for one in some])
+    differences = np.array([change.difference for change in some])
     count, mean = len(some), float(differences.mean())
-    measured = float(np.sqrt(np.mean([one.sd**2 for one in some])))
+    measured = float(np.sqrt(np.mean([change.sd**2 for change in some])))
     sd = float(differences.std(ddof=1)) if count > 1 else np.nan
     error = sd / np.sqrt(count)
     student = stats.t(max(count - 1, 1))
@@ -77,9 +77,9 @@ def _averaged(names: Names, some: Sequence[Change]) -> GroupChange:
     return GroupChange(
         *names,
         people=count,
-        changed=sum(one.verdict == "changed" for one in some),
-        before=float(np.mean([one.before for one in some])),
-        after=float(np.mean([one.after for one in some])),
+        changed=sum(change.verdict == "changed" for change in some),
+        before=float(np.mean([change.before for change in some])),
+        after=float(np.mean([change.after for change in some])),
         difference=mean,
         sd=sd,
         sd_measurement=measured,

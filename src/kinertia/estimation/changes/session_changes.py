@@ -86,7 +86,7 @@ def session(fit: Fit, condition: str | None = None) -> Session:
     chosen = next(iter(known)) if condition is None else condition
     if chosen not in known:
         raise KinertiaError(f"no trial of {fit.subject.name} has the condition {chosen!r}; stated are: {stated}")
-    return Session(fit, chosen, tuple(one for one in fit.trials if one.kinematics.trial.condition == chosen))
+    return Session(fit, chosen, tuple(trial for trial in fit.trials if trial.kinematics.trial.condition == chosen))
 
 
 def why_incomparable(before: Fit, after: Fit) -> str:
@@ -110,7 +110,7 @@ def session_features(
     before: Session, after: Session, progress: Callable[[float], None] = lambda share: None, draws: int | None = None
 ) -> tuple[StrideFeatures, StrideFeatures]:
     """Compute the features of the strides of two sessions, with one body, and in so many draws of each."""
-    count = min(draws or DRAWS, *(kept_draws(one.fit).count for one in (before, after)))
+    count = min(draws or DRAWS, *(kept_draws(visit.fit).count for visit in (before, after)))
     bodies = _one_body(before.fit, after.fit, count)
     first = _features(before, bodies[0], count, lambda share: progress(0.5 * share))
     return first, _features(after, bodies[1], count, lambda share: progress(0.5 + 0.5 * share))
@@ -118,23 +118,23 @@ def session_features(
 
 def changes_between(before: Rows, after: Rows, fixed_axes: bool) -> tuple[Change, ...]:
     """Judge the changes between two sessions by the events of both (`session_features`)."""
-    first, second = (conditions_by_outcome(one) for one in (before, after))
+    first, second = (conditions_by_outcome(visit) for visit in (before, after))
     return tuple(judged(first, second, partial(_apart, fixed_axes)))
 
 
-def _features(own: Session, bodies: np.ndarray, count: int, progress: Callable[[float], None]) -> StrideFeatures:
+def _features(visit: Session, bodies: np.ndarray, count: int, progress: Callable[[float], None]) -> StrideFeatures:
     """Return the strides of a session with the first of these bodies, and draws with the others."""
-    sources = usual_sources(own.fit)
+    sources = usual_sources(visit.fit)
     sources["shared"] = replace(sources["body"], bsp=bodies[1:])
-    with_mean = replace(_unmoved(own.fit), bsp=bodies[:1])
-    return stride_features(own.fit, own.trials, sources, count, progress, with_mean)
+    with_mean = replace(_unmoved(visit.fit), bsp=bodies[:1])
+    return stride_features(visit.fit, visit.trials, sources, count, progress, with_mean)
 
 
 def _one_body(before: Fit, after: Fit, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return (count + 1, s, 10) the mean of both bodies, then draws of the first one, at the mass of each fit."""
     tables = [_at_mass(_drawn_segments(fit), before.mass_kg / fit.mass_kg) for fit in (before, after)]
-    own = np.concatenate([np.mean(tables, axis=0, keepdims=True), kept_draws(before).bsp[:count]])
-    return own, _at_mass(own, after.mass_kg / before.mass_kg)
+    bodies = np.concatenate([np.mean(tables, axis=0, keepdims=True), kept_draws(before).bsp[:count]])
+    return bodies, _at_mass(bodies, after.mass_kg / before.mass_kg)
 
 
 def _drawn_segments(fit: Fit) -> np.ndarray:
@@ -158,18 +158,20 @@ def _unmoved(fit: Fit) -> PosteriorDraws:
 
 def _apart(fixed_axes: bool, outcome: str, before: Condition, after: Condition) -> dict[str, float]:
     """Return variances of a difference between sessions."""
-    each = {source: _variance(before, source) + _variance(after, source) for source in ("all", "body", "instruments")}
+    variance = {
+        source: _variance(before, source) + _variance(after, source) for source in ("all", "body", "instruments")
+    }
     shared = float(np.var(after.drawn["shared"] - before.drawn["shared"], ddof=1))
-    contacts = sum(float(np.square(one.drawn["contacts"]).sum()) for one in (before, after))
-    parts = parts_of(max(each["all"] - each["body"], 0.0) + shared, each["instruments"], shared)
+    contacts = sum(float(np.square(condition.drawn["contacts"]).sum()) for condition in (before, after))
+    parts = parts_of(max(variance["all"] - variance["body"], 0.0) + shared, variance["instruments"], shared)
     if fixed_axes and outcome.startswith(_BY_AXES):
         parts["markers"] *= _FIXED_AXES**2
     parts["markers"] += contacts
     return parts
 
 
-def _variance(one: Condition, source: str) -> float:
-    return float(np.var(one.drawn[source], ddof=1))
+def _variance(condition: Condition, source: str) -> float:
+    return float(np.var(condition.drawn[source], ddof=1))
 
 
 def _recordings(fit: Fit) -> set[bytes]:

@@ -83,11 +83,11 @@ def stride_features(
         progress: is told the share done.
         centre: its first draw takes the place of the estimate, if given.
     """
-    own = _Strides.of(trials)
+    strides = _Strides.of(trials)
     middle = trials if centre is None else _drawn(fit, trials, centre, 0, False).trials
-    estimate = own.curves(middle, fit.mass_kg)
+    estimate = strides.curves(middle, fit.mass_kg)
     shown = np.isfinite(estimate).any(axis=1)
-    keys, weights, few = own.chosen(shown)
+    keys, weights, few = strides.chosen(shown)
     counts = {source: count if source == "all" else max(2, count // _FEWER) for source in sources}
     events: dict[str, np.ndarray] = {}
     curves: dict[str, np.ndarray] = {}
@@ -95,18 +95,21 @@ def stride_features(
     for source, draws in sources.items():
         features, rows = [], []
         for number in range(counts[source]):
-            drawn = own.curves(_drawn(fit, trials, draws, number, source == "all").trials, fit.mass_kg)[shown]
+            drawn = strides.curves(_drawn(fit, trials, draws, number, source == "all").trials, fit.mass_kg)[shown]
             features.append(_means(drawn, weights))
             rows.append(drawn[few].astype(np.float32))
             done += 1
             progress(done / sum(counts.values()))
         events[source], curves[source] = np.array(features), np.array(rows)
     means = _means(estimate[shown], weights)
-    moved = [own.later(trials, side, kind) for side, kind in _CONTACTS]
-    others = [one.curves(middle, fit.mass_kg)[shown] for one in moved]
-    departed = [_means(one, each.chosen(shown)[1]) - means for one, each in zip(others, moved, strict=True)]
+    moved = [strides.later(trials, side, kind) for side, kind in _CONTACTS]
+    others = [moved_strides.curves(middle, fit.mass_kg)[shown] for moved_strides in moved]
+    departed = [
+        _means(moved_curves, moved_strides.chosen(shown)[1]) - means
+        for moved_curves, moved_strides in zip(others, moved, strict=True)
+    ]
     events["contacts"] = np.nan_to_num(np.array(departed))
-    curves["contacts"] = np.nan_to_num(np.array([one[few] - estimate[shown][few] for one in others]))
+    curves["contacts"] = np.nan_to_num(np.array([other[few] - estimate[shown][few] for other in others]))
     known = np.isfinite(means)
     named = [(trial, f"{name} {event}", side, stride) for trial, name, side, stride in keys for event in EVENTS]
     of_events = tuple(key for key, is_known in zip(named, known, strict=True) if is_known)
@@ -119,9 +122,9 @@ def stride_features(
 
 def event_means(trials: Sequence[Estimated], mass_kg: float) -> dict[Key, float]:
     """Return the features of all strides of these trials; moments over this mass."""
-    own = _Strides.of(trials)
-    keys, weights, _ = own.chosen(np.ones(len(own.keys), dtype=bool))
-    means = _means(own.curves(trials, mass_kg), weights)
+    strides = _Strides.of(trials)
+    keys, weights, _ = strides.chosen(np.ones(len(strides.keys), dtype=bool))
+    means = _means(strides.curves(trials, mass_kg), weights)
     named = ((trial, f"{name} {event}", side, stride) for trial, name, side, stride in keys for event in EVENTS)
     return {key: float(mean) for key, mean in zip(named, means, strict=True) if np.isfinite(mean)}
 
@@ -144,13 +147,16 @@ class _Strides:
 
     @classmethod
     def of(cls, trials: Sequence[Estimated]) -> "_Strides":
-        strides = [[one for one in (*trial.strides, *trial.phases) if one.phase != "landing"] for trial in trials]
+        strides = [
+            [candidate for candidate in (*trial.strides, *trial.phases) if candidate.phase != "landing"]
+            for trial in trials
+        ]
         keys: list[Key] = []
         of_curve: list[Stride] = []
         few: list[bool] = []
-        for trial, own in zip(trials, strides, strict=True):
-            kept = spread_evenly(own, MOST_CURVES)
-            for stride in own:
+        for trial, of_trial in zip(trials, strides, strict=True):
+            kept = spread_evenly(of_trial, MOST_CURVES)
+            for stride in of_trial:
                 for name, *_ in _columns(trial, stride.side):
                     keys.append((trial.name, name, stride.side, f"{stride.phase} {stride.number}"))
                     of_curve.append(stride)
@@ -160,15 +166,15 @@ class _Strides:
     def curves(self, trials: Sequence[Estimated], mass_kg: float) -> np.ndarray:
         """Return the curves (k, 101) of these trials, degrees and N m/kg."""
         rows: list[np.ndarray] = []
-        for trial, own in zip(trials, self.strides, strict=True):
-            if not own:
+        for trial, of_trial in zip(trials, self.strides, strict=True):
+            if not of_trial:
                 continue
             source = CurveSource(trial, "estimate")
-            time = np.concatenate([stride.time for stride in own])
-            angles = np.degrees(source.angle(time)).reshape(len(own), len(PERCENT), -1)
+            time = np.concatenate([stride.time for stride in of_trial])
+            angles = np.degrees(source.angle(time)).reshape(len(of_trial), len(PERCENT), -1)
             moments = source.joint_moment(time) / mass_kg
-            moments = moments.reshape(len(own), len(PERCENT), -1)
-            for k, stride in enumerate(own):
+            moments = moments.reshape(len(of_trial), len(PERCENT), -1)
+            for k, stride in enumerate(of_trial):
                 for _, is_angle, column in _columns(trial, stride.side):
                     rows.append((angles if is_angle else moments)[k, :, column])
         return np.array(rows).reshape(-1, len(PERCENT))
@@ -176,15 +182,19 @@ class _Strides:
     def later(self, trials: Sequence[TrialFit], side: str, kind: str) -> "_Strides":
         """Return the strides with this kind of contact of a foot later by CONTACT_SD_S where no plate measured it."""
         moved: list[list[Stride]] = []
-        for trial, own in zip(trials, self.strides, strict=True):
-            edges = [one.time_s for one in load_edges(trial.kinematics.trial.loads) if one[1:] == (side, kind)]
-            moved.append([_later(one, side, kind, edges) for one in own])
+        for trial, of_trial in zip(trials, self.strides, strict=True):
+            edges = [
+                load_edge.time_s
+                for load_edge in load_edges(trial.kinematics.trial.loads)
+                if load_edge[1:] == (side, kind)
+            ]
+            moved.append([_later(stride, side, kind, edges) for stride in of_trial])
         other = {
-            id(one): each
-            for own, new in zip(self.strides, moved, strict=True)
-            for one, each in zip(own, new, strict=True)
+            id(stride): later
+            for of_trial, new in zip(self.strides, moved, strict=True)
+            for stride, later in zip(of_trial, new, strict=True)
         }
-        return replace(self, strides=moved, of_curve=[other[id(one)] for one in self.of_curve])
+        return replace(self, strides=moved, of_curve=[other[id(stride)] for stride in self.of_curve])
 
     def chosen(self, shown: np.ndarray) -> tuple[list[Key], np.ndarray, np.ndarray]:
         """Return keys, weights (k, 5, 101) of EVENTS, and which are kept as curves, of the curves shown."""
@@ -196,8 +206,8 @@ class _Strides:
 def _later(stride: Stride, side: str, kind: str, edges: Sequence[float]) -> Stride:
     """Return a stride with this kind of contact later where it is at none of the edges (s) of loads."""
     end = "toe off" if stride.phase == "stance" else "heel strike"
-    own, other = {"start_s": "heel strike", "end_s": end, "toe_off_s": "toe off"}, _OPPOSITE
-    names = [name for name, of in (own if stride.side == side else other).items() if of == kind]
+    same_foot, other = {"start_s": "heel strike", "end_s": end, "toe_off_s": "toe off"}, _OPPOSITE
+    names = [name for name, edge_kind in (same_foot if stride.side == side else other).items() if edge_kind == kind]
     times = {name: float(getattr(stride, name)) for name in names}
     later: dict[str, Any] = {
         name: time + CONTACT_SD_S
@@ -216,8 +226,8 @@ def _columns(trial: Estimated, side: str) -> Iterator[tuple[str, bool, int]]:
             yield f"angle {base}", True, column
     joints = () if trial.joint_curves is None else trial.joint_curves.joints["estimate"].joints
     for k, joint in enumerate(joints):
-        base, own = joint_and_side(joint)
-        if own in ("", side):
+        base, joint_side = joint_and_side(joint)
+        if joint_side in ("", side):
             for component, name in enumerate(component_names(base)):
                 yield f"moment {name}", False, 3 * k + component
 
@@ -231,20 +241,22 @@ def _means(curves: np.ndarray, weights: np.ndarray) -> np.ndarray:
 
 def _drawn(fit: Fit, trials: Sequence[TrialFit], draws: PosteriorDraws, number: int, knees: bool) -> Fit:
     assert fit.posterior is not None  # it has draws
-    own = replace(draws, trials=tuple(draws.trials[fit.trials.index(trial)] for trial in trials))
-    return drawn_fit(replace(fit, trials=tuple(trials), posterior=replace(fit.posterior, draws=own)), number, knees)
+    chosen_draws = replace(draws, trials=tuple(draws.trials[fit.trials.index(trial)] for trial in trials))
+    return drawn_fit(
+        replace(fit, trials=tuple(trials), posterior=replace(fit.posterior, draws=chosen_draws)), number, knees
+    )
 
 
 def only(draws: PosteriorDraws, body: bool) -> PosteriorDraws:
     """Return draws in which only the body, or only plates and synchronisation, differ from draw to draw."""
     trials = tuple(
         replace(
-            one,
-            coefficients=np.zeros_like(one.coefficients),
-            **({"plates": np.zeros_like(one.plates), "delay_s": np.zeros_like(one.delay_s)} if body else {}),
-            **({"impact": np.zeros_like(one.impact)} if body else {}),
+            trial,
+            coefficients=np.zeros_like(trial.coefficients),
+            **({"plates": np.zeros_like(trial.plates), "delay_s": np.zeros_like(trial.delay_s)} if body else {}),
+            **({"impact": np.zeros_like(trial.impact)} if body else {}),
         )
-        for one in draws.trials
+        for trial in draws.trials
     )
     mean = np.broadcast_to(draws.coordinate_values.mean(axis=0), draws.coordinate_values.shape)
     still = replace(draws, coordinate_values=mean, trials=trials).without_places()

@@ -82,7 +82,7 @@ class CurveSource:
         self.reactions = trial.reactions.whole if stage == "estimate" else measured_reactions(k)
         deviations = trial.deviations if stage == "estimate" else None
         if curves is None:
-            q, loads = (_spread(len(time), inner, each) for each in (trial.motion.q, trial.joint_loads[stage]))
+            q, loads = (_spread(len(time), inner, samples) for samples in (trial.motion.q, trial.joint_loads[stage]))
             legs = np.repeat(k.inside(time)[:, None], 2, axis=1)
             spread = None if deviations is None else deviations.spread_over(inner, len(time))
             joints = np.empty((len(time), 0, 3))
@@ -118,7 +118,7 @@ class CurveSource:
 
     @cached_property
     def _deviation(self) -> "list[Gapped]":
-        return [] if self._spread is None else [Gapped.of(self._time, each, _linear) for each in self._spread.curves]
+        return [] if self._spread is None else [Gapped.of(self._time, curve, _linear) for curve in self._spread.curves]
 
     def angle(self, time: np.ndarray) -> np.ndarray:
         """Return coordinates (n, c); those of IK + ID wherever inverse kinematics determined them."""
@@ -141,7 +141,7 @@ class CurveSource:
         if self._spread is None:
             none = CurveDeviations.filled(0, self._angles.shape[1], self._joints.shape[1], np.nan)
             return none.spread_over(np.zeros(0, dtype=int), len(time))
-        return CurveDeviations(*(each(time) for each in self._deviation))
+        return CurveDeviations(*(deviation(time) for deviation in self._deviation))
 
     def force(self, time: np.ndarray) -> np.ndarray:
         """Return the ground reaction force (n, 2, 3) N on right and left foot."""
@@ -174,9 +174,9 @@ class Gapped:
         for number, mask in enumerate(masks.T):
             columns = np.flatnonzero(group.reshape(-1) == number)
             for first, last in runs(mask):
-                own = slice(first, last + 1)
+                inside = slice(first, last + 1)
                 if last - first + 1 >= _FEWEST:
-                    curve = through(time[own], values[own][:, columns])
+                    curve = through(time[inside], values[inside][:, columns])
                     parts.append((columns, float(time[first]), float(time[last]), curve))
         return cls(values.shape[1:], tuple(parts))
 

@@ -134,14 +134,14 @@ def _curves(trial: Estimated, mass_kg: float, stage: Stage, strides: Sequence[_T
                 names = [f"{name}_joint_moment" for name in component_names(base)]
                 own_sd = sd.joints[:, k, 0] / mass_kg if sd.joints is not None else np.full((len(time), 3), np.nan)
                 rows = zip(names, three[:, k].T, own_sd.T, strict=True)
-                curves += [curve("joint_moment", *each) for each in rows]
+                curves += [curve("joint_moment", *row) for row in rows]
         foot, directions = FEET.index(stride.side), _directions(path, stride.side)
         share = 100.0 / (mass_kg * GRAVITY_M_S2)
         ground = share * source.force(time)[:, foot] @ directions.T
         ground_sd = share * np.sqrt(np.square(sd.ground_forces[:, foot]) @ np.square(directions).T)
-        curves += [curve("force", *each) for each in zip(FORCES, ground.T, ground_sd.T, strict=True)]
-        curves += [curve("clinical", *each, np.full(len(PERCENT), np.nan)) for each in angles.items()]
-        yield from (one for one in curves if np.isfinite(one.value).any())
+        curves += [curve("force", *component) for component in zip(FORCES, ground.T, ground_sd.T, strict=True)]
+        curves += [curve("clinical", *named_angle, np.full(len(PERCENT), np.nan)) for named_angle in angles.items()]
+        yield from (known_curve for known_curve in curves if np.isfinite(known_curve.value).any())
 
 
 def _tracked_strides(trial: Estimated, strides: Sequence[Stride]) -> list[_TrackedStride]:
@@ -160,10 +160,12 @@ def _tracked_strides(trial: Estimated, strides: Sequence[Stride]) -> list[_Track
 
 def _paths(feet: FeetUnderPelvis, strides: Sequence[Stride], belt: Belt | None) -> np.ndarray:
     """Return how far the person goes in each stride (k, 3) m; where the pelvis faces in phases that are no stride."""
-    moved = iter(travelled(feet, [one for one in strides if one.phase == "stride"], belt))
+    moved = iter(travelled(feet, [stride for stride in strides if stride.phase == "stride"], belt))
     result = [
-        next(moved) if one.phase == "stride" else feet.heading[within(feet.time, one.start_s, one.end_s)].mean(axis=0)
-        for one in strides
+        next(moved)
+        if stride.phase == "stride"
+        else feet.heading[within(feet.time, stride.start_s, stride.end_s)].mean(axis=0)
+        for stride in strides
     ]
     return np.reshape(result, (-1, 3))
 
@@ -184,23 +186,23 @@ def cycle_columns(
 
 def columns_of(curves: Sequence[CycleCurve]) -> dict[str, Any]:
     """Return the columns of `Fit.cycles`, by name: of the strides among these curves."""
-    own = [one for one in curves if one.stride.phase == "stride"]
-    return {name: values for name, values in phase_columns(own).items() if name != "phase"}
+    of_strides = [curve for curve in curves if curve.stride.phase == "stride"]
+    return {name: values for name, values in phase_columns(of_strides).items() if name != "phase"}
 
 
 def phase_columns(curves: Sequence[CycleCurve]) -> dict[str, Any]:
     """Return the columns of `Fit.contact_phases`, by name, with these curves."""
     samples = len(PERCENT)
     return {
-        "trial": [one.trial for one in curves for _ in range(samples)],
-        "task": [one.task for one in curves for _ in range(samples)],
-        "phase": [one.stride.phase for one in curves for _ in range(samples)],
-        "side": [one.stride.side for one in curves for _ in range(samples)],
-        "stride": np.repeat([one.stride.number for one in curves], samples).astype(int),
+        "trial": [curve.trial for curve in curves for _ in range(samples)],
+        "task": [curve.task for curve in curves for _ in range(samples)],
+        "phase": [curve.stride.phase for curve in curves for _ in range(samples)],
+        "side": [curve.stride.side for curve in curves for _ in range(samples)],
+        "stride": np.repeat([curve.stride.number for curve in curves], samples).astype(int),
         "percent": np.tile(PERCENT, len(curves)).astype(int),
-        "quantity": [one.quantity for one in curves for _ in range(samples)],
-        "value": np.concatenate([one.value for one in curves]) if curves else np.zeros(0),
-        "sd": np.concatenate([one.sd for one in curves]) if curves else np.zeros(0),
+        "quantity": [curve.quantity for curve in curves for _ in range(samples)],
+        "value": np.concatenate([curve.value for curve in curves]) if curves else np.zeros(0),
+        "sd": np.concatenate([curve.sd for curve in curves]) if curves else np.zeros(0),
     }
 
 
@@ -210,10 +212,10 @@ def spatiotemporal_columns(trials: Sequence[Estimated]) -> dict[str, list[Any]]:
     for trial in trials:
         feet = feet_under_pelvis(trial.skeleton, trial.kinematics)
         measures = spatiotemporal(feet, trial.strides, trial.kinematics.trial.belt)
-        for stride, one in zip(trial.strides, measures, strict=True):
+        for stride, of_stride in zip(trial.strides, measures, strict=True):
             place = {"trial": trial.name, "side": stride.side, "stride": stride.number}
             times = {"start_s": stride.start_s, "end_s": stride.end_s, "toe_off_s": stride.toe_off_s}
-            rows.append({**place, **times, **asdict(one), "on_plates": stride.on_plates})
+            rows.append({**place, **times, **asdict(of_stride), "on_plates": stride.on_plates})
     measured = [field.name for field in fields(Spatiotemporal)]
     names = ["trial", "side", "stride", "start_s", "end_s", "toe_off_s", *measured, "on_plates"]
     return {name: [row[name] for row in rows] for name in names}
@@ -223,10 +225,10 @@ def spread_evenly(strides: Sequence[Stride], most: int | None) -> list[Stride]:
     """Select at most so many strides of each side, evenly spread over the trial; all if None."""
     kept = []
     for side in FEET:
-        own = [stride for stride in strides if stride.side == side]
-        if most is not None and len(own) > most:
-            own = [own[k] for k in np.linspace(0, len(own) - 1, most).round().astype(int)]
-        kept += own
+        of_side = [stride for stride in strides if stride.side == side]
+        if most is not None and len(of_side) > most:
+            of_side = [of_side[k] for k in np.linspace(0, len(of_side) - 1, most).round().astype(int)]
+        kept += of_side
     return kept
 
 
@@ -282,11 +284,11 @@ def peak_columns(curves: Sequence[CycleCurve]) -> dict[str, Any]:
     """
     rows = []
     for peak in (*PEAKS, *LANDING_PEAKS):
-        for one in curves:
-            if one.quantity == peak.quantity and (one.stride.phase == "landing") == (peak in LANDING_PEAKS):
-                value, sd, percent = _read(peak, one)
-                unit = f"{UNITS[one.kind]} s".replace("/kg s", " s/kg") if peak.impulse else UNITS[one.kind]
-                place = (one.trial, one.task, one.stride.phase, one.stride.side, one.stride.number)
+        for curve in curves:
+            if curve.quantity == peak.quantity and (curve.stride.phase == "landing") == (peak in LANDING_PEAKS):
+                value, sd, percent = _read(peak, curve)
+                unit = f"{UNITS[curve.kind]} s".replace("/kg s", " s/kg") if peak.impulse else UNITS[curve.kind]
+                place = (curve.trial, curve.task, curve.stride.phase, curve.stride.side, curve.stride.number)
                 rows.append((*place, peak.name, unit, value, sd, percent))
     rows.sort(key=lambda row: (row[0], row[2] != "stride", row[3] != "r", row[4]))
     names = ("trial", "task", "phase", "side", "stride", "peak", "unit", "value", "sd", "percent")

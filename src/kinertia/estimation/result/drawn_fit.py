@@ -67,7 +67,7 @@ def drawn_fit(fit: Fit, number: int, knees: bool = True) -> Fit:
     bsp = _bsp(fit.estimate, draws, number)
     skeleton = _skeleton(fit, fit.skeleton, draws, number)
     rows = zip(fit.trials, draws.trials, strict=True)
-    drawn = tuple(_trial(fit, trial, own, number, (skeleton, bsp), knees) for trial, own in rows)
+    drawn = tuple(_trial(fit, trial, trial_draws, number, (skeleton, bsp), knees) for trial, trial_draws in rows)
     return replace(fit, estimate=bsp, skeleton=skeleton, trials=drawn, posterior=None)
 
 
@@ -100,15 +100,15 @@ def _trial(
     moved = Motion(*(spline(time, order) for order in range(3)))
     motion = moved if trial.trajectory is None else moved.cut(k.frames - k.trajectory_frames.start)
     reactions = _reactions(trial.reactions, draws, number)
-    own = skeleton.with_positions(skeleton.marker_locals + in_trial)
+    drawn_skeleton = skeleton.with_positions(skeleton.marker_locals + in_trial)
     curves = trial.joint_curves
     if curves is not None:
         random = np.random.default_rng([_GEOMETRY_SEED, number]) if knees else None
-        curves = curves.drawn(k, (own, bsp, moved, reactions), random)
-    loads = inverse_dynamics(own, bsp, motion, reactions.at(k.time))
+        curves = curves.drawn(k, (drawn_skeleton, bsp, moved, reactions), random)
+    loads = inverse_dynamics(drawn_skeleton, bsp, motion, reactions.at(k.time))
     return replace(
         trial,
-        skeleton=own,
+        skeleton=drawn_skeleton,
         motion=motion,
         trajectory=trajectory,
         reactions=reactions,

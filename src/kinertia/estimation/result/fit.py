@@ -214,9 +214,9 @@ class Fit:
     @property
     def attached_kg(self) -> float:
         """Estimated mass (kg) of the objects that the person wore or carried, which are extra segments."""
-        own = SEGMENTS if self.file is None else self.file.bsp.segments
+        bodies = SEGMENTS if self.file is None else self.file.bsp.segments
         rows = zip(self.estimate.segments, self.estimate.mass_kg.tolist(), strict=True)
-        return float(sum(mass for segment, mass in rows if segment not in own))
+        return float(sum(mass for segment, mass in rows if segment not in bodies))
 
     def save(self, folder: str | Path, force: bool = False) -> Path:
         """Write all result files into a folder, as `kinertia.save_fit` does, and return the folder.

@@ -89,15 +89,15 @@ def with_norms(columns: Mapping[str, Any], norms: Mapping[str, Norm], skeleton: 
     norm, norm_sd, gvs, gps = np.full((4, len(values), size), np.nan)
     of_strides: dict[Any, dict[str, float]] = {}
     for k, quantity in enumerate(quantities):
-        if one := norms.get(quantity):
-            norm[k], norm_sd[k] = (np.interp(PERCENT, one.percent, each) for each in (one.mean, one.sd))
-            if one.convention and quantity in flipped and strides[k][1] == "l":
+        if band := norms.get(quantity):
+            norm[k], norm_sd[k] = (np.interp(PERCENT, band.percent, curve) for curve in (band.mean, band.sd))
+            if band.convention and quantity in flipped and strides[k][1] == "l":
                 norm[k] = -norm[k]
             if quantity in CLINICAL_ANGLES:
-                gvs[k] = of_strides.setdefault(strides[k], {})[quantity] = variable_score(values[k], one)
+                gvs[k] = of_strides.setdefault(strides[k], {})[quantity] = variable_score(values[k], band)
     for k, quantity in enumerate(quantities):
         known = of_strides.get(strides[k], {})
         if quantity in CLINICAL_ANGLES and len(known) == len(CLINICAL_ANGLES):
             gps[k] = rms_deg(list(known.values()))
     added = {"norm": norm, "norm_sd": norm_sd, "gvs": gvs, "gps": gps}
-    return {**columns, **{name: each.reshape(rows) for name, each in added.items()}}
+    return {**columns, **{name: column.reshape(rows) for name, column in added.items()}}

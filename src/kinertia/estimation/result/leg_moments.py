@@ -50,8 +50,8 @@ def known_legs(trial: Estimated) -> np.ndarray:
     known = np.repeat((k.inside(k.trial.markers.time) & k.complete)[:, None], 2, axis=1)
     if k.known is not None and trial.joint_curves is not None:
         for foot, segment in enumerate(skeleton.feet):
-            own = np.unique(skeleton.map.owner[skeleton.support[skeleton.segments.index(segment)]])
-            known[:, foot] |= k.known[:, own[own >= len(skeleton.joints[0].axes)]].all(axis=1)
+            axes = np.unique(skeleton.map.owner[skeleton.support[skeleton.segments.index(segment)]])
+            known[:, foot] |= k.known[:, axes[axes >= len(skeleton.joints[0].axes)]].all(axis=1)
     return known
 
 
@@ -96,10 +96,10 @@ def gaps_sentence(trials: Sequence[Estimated]) -> str:
     parts = []
     for trial in trials:
         spans: dict[str, list[str]] = {}
-        for one in moment_gaps(trial):
-            side = FOOT_NAMES[FEET.index(one.side)]
-            spans.setdefault(one.reason, []).append(f"{side} {one.start_s:.2f} to {one.end_s:.2f} s")
-        gaps = "; ".join(f"{reason} ({', '.join(own)})" for reason, own in spans.items())
+        for gap in moment_gaps(trial):
+            side = FOOT_NAMES[FEET.index(gap.side)]
+            spans.setdefault(gap.reason, []).append(f"{side} {gap.start_s:.2f} to {gap.end_s:.2f} s")
+        gaps = "; ".join(f"{reason} ({', '.join(texts)})" for reason, texts in spans.items())
         if gaps:
             parts.append(f"{trial.name}: {gaps}" if len(trials) > 1 else gaps)
     return ". ".join(parts)
@@ -107,7 +107,7 @@ def gaps_sentence(trials: Sequence[Estimated]) -> str:
 
 def _gaps(trial: Estimated) -> Iterator[MomentGap]:
     k = trial.kinematics
-    time, loads, own = k.trial.markers.time, k.trial.loads, k.trajectory_frames
+    time, loads, frames = k.trial.markers.time, k.trial.loads, k.trajectory_frames
     nearest = nearest_samples(loads.time, time)
     loaded = loads.force[nearest, :, 1] >= LOAD_THRESHOLD_N
     shared = np.zeros(len(time), dtype=bool) if loads.on_shared_plate is None else loads.on_shared_plate[nearest]
@@ -122,12 +122,12 @@ def _gaps(trial: Estimated) -> Iterator[MomentGap]:
             BESIDE: ~measured[:, foot],
             FAR: ~near_contacts(k.trial),
         }
-        which = np.select([known[:, foot], *reasons.values()], [-1, *range(len(reasons))], len(reasons))[own]
+        which = np.select([known[:, foot], *reasons.values()], [-1, *range(len(reasons))], len(reasons))[frames]
         names = [*reasons, ENDS]
         for number, name in enumerate(names):
             for first, last in runs(which == number):
-                if span_s(time[own], first, last) >= _SHORTEST_S:
-                    yield MomentGap(side, float(time[own][first]), float(time[own][last]), name)
+                if span_s(time[frames], first, last) >= _SHORTEST_S:
+                    yield MomentGap(side, float(time[frames][first]), float(time[frames][last]), name)
 
 
 class ForcesUsed(NamedTuple):
@@ -196,7 +196,7 @@ def outputs_of(fit: Fit, trial: TrialFit, convention: Convention, correlated: bo
     curves = trial.joint_curves
     motion, sd = (trial.motion, trial.deviations) if curves is None else (curves.motion, curves.deviations)
     found = model_outputs(trial.skeleton, body, motion, loads, fit.mass_kg, convention, sd, drawn)
-    return found if curves is None else [_where_known(one, curves, convention, fit.mass_kg) for one in found]
+    return found if curves is None else [_where_known(output, curves, convention, fit.mass_kg) for output in found]
 
 
 def output_times(trial: TrialFit) -> np.ndarray:
@@ -204,31 +204,31 @@ def output_times(trial: TrialFit) -> np.ndarray:
     return trial.time if trial.joint_curves is None else trial.joint_curves.time
 
 
-def _where_known(one: ModelOutput, curves: JointCurves, convention: Convention, mass_kg: float) -> ModelOutput:
+def _where_known(output: ModelOutput, curves: JointCurves, convention: Convention, mass_kg: float) -> ModelOutput:
     """Return an output with NaN where it is not known; what a hinge transmits gets the SD of `JointCurves`."""
-    label, joints = f"{one.joint.lower()}_{one.side}", curves.joints["estimate"]
-    if one.kind == "ANGLES" or label not in joints.joints:
+    label, joints = f"{output.joint.lower()}_{output.side}", curves.joints["estimate"]
+    if output.kind == "ANGLES" or label not in joints.joints:
         known = np.logical_or.reduce(curves.known, axis=1)
     else:
         row = joints.joints.index(label)
         known = np.isfinite(joints.moments[:, row, 0])
-        if one.kind == "MOMENTS" and curves.moment_sd is not None:
+        if output.kind == "MOMENTS" and curves.moment_sd is not None:
             factor = (1000.0 if convention == "plug-in-gait" else 1.0) / mass_kg
-            one = replace(one, sd=np.where(np.isfinite(one.sd), one.sd, factor * curves.moment_sd[:, row]))
+            output = replace(output, sd=np.where(np.isfinite(output.sd), output.sd, factor * curves.moment_sd[:, row]))
     shown = known[:, None]
-    return replace(one, values=np.where(shown, one.values, np.nan), sd=np.where(shown, one.sd, np.nan))
+    return replace(output, values=np.where(shown, output.values, np.nan), sd=np.where(shown, output.sd, np.nan))
 
 
 def _departures(fit: Fit, trial: TrialFit) -> Departures | None:
     """Return the departures of the draws in a trial, at `output_times`; None if the fit has no draws."""
     if fit.posterior is None or fit.posterior.draws is None:
         return None
-    k, kept = [one.name for one in fit.trials].index(trial.name), fit.posterior.draws
-    own = replace(kept, trials=(kept.trials[k],))
-    alone = replace(fit, trials=(trial,), posterior=replace(fit.posterior, draws=own))
+    k, kept = [fitted.name for fitted in fit.trials].index(trial.name), fit.posterior.draws
+    trial_draws = replace(kept, trials=(kept.trials[k],))
+    alone = replace(fit, trials=(trial,), posterior=replace(fit.posterior, draws=trial_draws))
     here = _curves(trial)
     drawn = [_curves(drawn_fit(alone, number).trials[0]) for number in range(min(kept.count, _MOST_DRAWS))]
-    return Departures(*(np.array(each) - at for each, at in zip(zip(*drawn, strict=True), here, strict=True)))
+    return Departures(*(np.array(departed) - at for departed, at in zip(zip(*drawn, strict=True), here, strict=True)))
 
 
 def _curves(trial: TrialFit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

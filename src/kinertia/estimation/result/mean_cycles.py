@@ -59,10 +59,10 @@ def mean_curves(fit: Fit) -> MeanCurves:
     found: dict[tuple[str, str], list[np.ndarray]] = {}
     flipped = {f"{name}_{kind}" for name in opposite_on_left(fit.skeleton) for kind in ("angle", "moment")}
     for stage, kinds in _KINDS.items():
-        for one in (curve for trial in main_task(fit).trials for curve in cycle_curves(trial, fit.mass_kg, stage)):
-            if one.kind in kinds:
-                sign = -1.0 if one.quantity in flipped and one.stride.side == "l" else 1.0
-                found.setdefault((one.quantity, one.stride.side), []).append(sign * one.value)
+        for cycle in (curve for trial in main_task(fit).trials for curve in cycle_curves(trial, fit.mass_kg, stage)):
+            if cycle.kind in kinds:
+                sign = -1.0 if cycle.quantity in flipped and cycle.stride.side == "l" else 1.0
+                found.setdefault((cycle.quantity, cycle.stride.side), []).append(sign * cycle.value)
     return {name: mean_of_common(np.array(curves)) for name, curves in found.items()}
 
 
@@ -110,7 +110,7 @@ def fits_by_task(fit: Fit) -> dict[str, Fit]:
     for k, trial in enumerate(fit.trials):
         if trial.strides:
             trials.setdefault(trial.kinematics.trial.task, []).append(k)
-    strides = {task: sum(len(fit.trials[k].strides) for k in own) for task, own in trials.items()}
+    strides = {task: sum(len(fit.trials[k].strides) for k in members) for task, members in trials.items()}
     order = sorted(trials, key=lambda task: (task != "walk", -strides[task]))
     return {task: replace(fit, trials=tuple(fit.trials[k] for k in trials[task])) for task in order}
 
@@ -143,7 +143,7 @@ def gait_profile(fit: Fit, norms: Mapping[str, Norm]) -> GaitProfile:
 
 def expect_all_nine(norms: Mapping[str, Norm]) -> None:
     """Raise a KinertiaError if norms lack a variable of the score."""
-    if lacking := [one.title for quantity, one in CLINICAL_ANGLES.items() if quantity not in norms]:
+    if lacking := [title.title for quantity, title in CLINICAL_ANGLES.items() if quantity not in norms]:
         raise KinertiaError(
             f"the norms lack {', '.join(lacking)}, which the Gait Profile Score needs: make them with kinertia norms"
         )
@@ -185,12 +185,12 @@ def remarks(fit: Fit, norm: Norm) -> tuple[str, ...]:
 
 def check_convention(fit: Fit, norms: Mapping[str, Norm]) -> None:
     """Raise a KinertiaError if norms state a different convention from a fit's."""
-    own = convention_of(fit)
+    fit_convention = convention_of(fit)
     for norm in norms.values():
-        if norm.convention and norm.convention != own:
+        if norm.convention and norm.convention != fit_convention:
             raise KinertiaError(
-                f"the norms are of {norm.convention}, this fit is of {own}: angles and signs differ; make norms from "
-                "fits with the same model"
+                f"the norms are of {norm.convention}, this fit is of {fit_convention}: angles and signs differ; make "
+                "norms from fits with the same model"
             )
 
 
@@ -237,7 +237,7 @@ def mean_speed_m_s(fit: Fit) -> float:
 
 def mixture(people: Sequence[Control]) -> str:
     """Report in words whether these controls mix children and adults, or may; empty if not."""
-    ages = [one.age_years for one in people]
+    ages = [person.age_years for person in people]
     stated = [age for age in ages if age is not None]
     children = sum(age < ADULT_YEARS for age in stated)
     if 0 < children < len(stated):
@@ -257,20 +257,20 @@ def band_columns(people: Sequence[Control]) -> dict[str, list[Any]]:
     """
     if len(people) < FEWEST_PEOPLE:
         raise KinertiaError(f"norms need at least {FEWEST_PEOPLE} different people; found {len(people)}")
-    conventions = sorted({one.convention for one in people})
+    conventions = sorted({person.convention for person in people})
     if len(conventions) > 1:
         raise KinertiaError(f"people were fitted with different models, whose angles differ: {'; '.join(conventions)}")
-    ages = [one.age_years for one in people if one.age_years is not None]
-    speeds = [one.speed_m_s for one in people if np.isfinite(one.speed_m_s)]
+    ages = [person.age_years for person in people if person.age_years is not None]
+    speeds = [person.speed_m_s for person in people if np.isfinite(person.speed_m_s)]
     spans = {
-        f"{name}_{end}": round(float(of(values)), 3) if values else None
+        f"{name}_{end}": round(float(extreme(values)), 3) if values else None
         for name, values in (("age_years", ages), ("speed_m_s", speeds))
-        for end, of in (("min", min), ("max", max))
+        for end, extreme in (("min", min), ("max", max))
     }
     names = ("quantity", "percent", "mean", "sd", "n")
     rows: list[tuple[Any, ...]] = []
-    for quantity in sorted({name for one in people for name in one.curves}):
-        curves = np.array([one.curves[quantity] for one in people if quantity in one.curves])
+    for quantity in sorted({name for person in people for name in person.curves}):
+        curves = np.array([person.curves[quantity] for person in people if quantity in person.curves])
         for percent, values in zip(PERCENT.tolist(), curves.T, strict=True):
             known = values[np.isfinite(values)]
             if len(known) >= FEWEST_PEOPLE:

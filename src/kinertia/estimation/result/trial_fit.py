@@ -89,23 +89,29 @@ class JointCurves:
         time, known = kinematics.trajectory_time, kinematics.trajectory_known
         forces, joints = {}, {}
         for name, (skeleton, bsp, moved, reactions) in stages.items():
-            loads, own = reactions.at(time), known_joints(skeleton, known)
+            loads, known_loads = reactions.at(time), known_joints(skeleton, known)
             forces[name] = np.where(known, inverse_dynamics(skeleton, bsp, moved, loads), np.nan)
-            joints[name] = _only(joint_moments(skeleton, bsp, moved, loads), own)
+            joints[name] = _only(joint_moments(skeleton, bsp, moved, loads), known_loads)
         if deviations is not None:
-            masked = {each: np.where(known, getattr(deviations, each), np.nan) for each in ("moments", "powers")}
-            three = None if deviations.joints is None else np.where(own[:, :, None, None], deviations.joints, np.nan)
+            masked = {kind: np.where(known, getattr(deviations, kind), np.nan) for kind in ("moments", "powers")}
+            three = (
+                None
+                if deviations.joints is None
+                else np.where(known_loads[:, :, None, None], deviations.joints, np.nan)
+            )
             deviations = replace(deviations, **masked, joints=three)
         return cls(time, known, motion, forces, joints, deviations)
 
     def drawn(self, kinematics: Kinematics, stage: Stage, random: np.random.Generator | None) -> JointCurves:
         """Return the curves of a draw of the estimate, with knee geometry drawn if `random` is given, without standard
         deviations."""
-        own = type(self).of(kinematics, stage[2], {"estimate": stage}, None)
-        loads = own.joints["estimate"]
+        drawn_curves = type(self).of(kinematics, stage[2], {"estimate": stage}, None)
+        loads = drawn_curves.joints["estimate"]
         if random is not None:
             loads = with_drawn_knees(stage[0], body_joints(stage[0]), loads, random)
-        return replace(own, forces={**self.forces, **own.forces}, joints={**self.joints, "estimate": loads})
+        return replace(
+            drawn_curves, forces={**self.forces, **drawn_curves.forces}, joints={**self.joints, "estimate": loads}
+        )
 
 
 def known_joints(skeleton: Skeleton, known: np.ndarray) -> np.ndarray:
@@ -124,7 +130,7 @@ def known_joints(skeleton: Skeleton, known: np.ndarray) -> np.ndarray:
 def _beyond(skeleton: Skeleton, joint: BodyJoint) -> list[int]:
     """Return the coordinates of joints distal to a joint."""
     child = skeleton.support[skeleton.segments.index(joint.child)]
-    after = [own for own in skeleton.support if (own & child).sum() == child.sum()]
+    after = [ancestors for ancestors in skeleton.support if (ancestors & child).sum() == child.sum()]
     axes = np.logical_or.reduce(after) & ~child
     return [int(column) for column in np.unique(skeleton.map.owner[axes])]
 

@@ -85,7 +85,7 @@ class Posterior:
     @property
     def instrument_errors(self) -> tuple[CalibrationEntry, ...]:
         """Entries of `calibration` for plates and synchronisation."""
-        return tuple(one for one in self.calibration if one.of_instrument)
+        return tuple(entry for entry in self.calibration if entry.of_instrument)
 
     @property
     def information(self) -> np.ndarray:
@@ -155,7 +155,11 @@ def fit_simultaneous(
     pooled = seen.pooled
     calibration = calibration_prior(used, uncertainty, seen.misplaced_m)
     count = len(trials)
-    others = [reading(*each) for each in zip(pooled[:count], otherwise, bandwidths, strict=True)] if otherwise else []
+    others = (
+        [reading(*trial_inputs) for trial_inputs in zip(pooled[:count], otherwise, bandwidths, strict=True)]
+        if otherwise
+        else []
+    )
     others += pooled[count:] if otherwise else ()
     result = estimate_simultaneous(used, prior, calibration, pooled, progress, others, (*TERMS, *terms)).of_first(count)
     staying = uncertainty.marker_sd_m is None
@@ -164,12 +168,12 @@ def fit_simultaneous(
     offsets_m = [0.0 if staying else moved for moved in result.marker_offsets_m]
     inside = [np.flatnonzero(k.inside(o.time)) for k, o in zip(trials, pooled, strict=False)]
     motions = tuple(m.cut(frames) for m, frames in zip(result.motions, inside, strict=True))
-    spans = [_trajectory_frames(one, k) for one, k in zip(pooled, trials, strict=False)]
+    spans = [_trajectory_frames(observation, k) for observation, k in zip(pooled, trials, strict=False)]
     informed = any(o.dynamic.any() for o in pooled) or bool(uncertainty.instruments.session)
     known = result.curve_deviations if informed else [sd.of_motion_alone() for sd in result.curve_deviations]
     known = [
-        _with_placement(sd, calibrated, motion, one, uncertainty)
-        for sd, motion, one in zip(known, result.motions, pooled, strict=False)
+        _with_placement(sd, calibrated, motion, observation, uncertainty)
+        for sd, motion, observation in zip(known, result.motions, pooled, strict=False)
     ]
     curves = zip(known, pooled, spans, strict=False)
     return SimultaneousFit(
@@ -223,8 +227,11 @@ def _posterior(
     observations = seen.pooled[: len(trials)]
     covariance, before = (uncertainty.whole_covariance(c) for c in (result.bsp_covariance, prior.covariance))
     complete = [m if k.complete else m.cut(slice(0, 0)) for m, k in zip(motions, trials, strict=True)]
-    load_sd = [np.repeat([one.force_sd, one.moment_sd], 3) for one in observations]
-    reduced = (np.broadcast_to(one.impact, one.dynamic.shape)[one.dynamic] for one in observations)
+    load_sd = [np.repeat([observation.force_sd, observation.moment_sd], 3) for observation in observations]
+    reduced = (
+        np.broadcast_to(observation.impact, observation.dynamic.shape)[observation.dynamic]
+        for observation in observations
+    )
     return Posterior(
         prior_sd=np.sqrt(np.diag(before)).reshape(-1, 10),
         sd=np.sqrt(np.diag(covariance)).reshape(-1, 10),
@@ -245,10 +252,10 @@ def _posterior(
 
 def compared_with(fitted: SimultaneousFit, other: SimultaneousFit) -> SimultaneousFit:
     """Mark errors that only one of two equally likely interpretations of the trials supports as contradicted."""
-    elsewhere = {one.key: one.supported for one in other.posterior.calibration}
+    elsewhere = {entry.key: entry.supported for entry in other.posterior.calibration}
     calibration = tuple(
-        replace(one, contradicted_by=OTHER_SIGN) if one.supported and not elsewhere[one.key] else one
-        for one in fitted.posterior.calibration
+        replace(entry, contradicted_by=OTHER_SIGN) if entry.supported and not elsewhere[entry.key] else entry
+        for entry in fitted.posterior.calibration
     )
     return replace(fitted, posterior=replace(fitted.posterior, calibration=calibration))
 
@@ -281,8 +288,8 @@ def calibration_prior(
     throughout.
     """
     known = uncertainty.marker_sd_m
-    each = np.maximum(misplaced_m, _STAYING_SD_M) if known is None else known
-    places = np.broadcast_to(each, len(skeleton.markers)).copy()
+    place_sd_m = np.maximum(misplaced_m, _STAYING_SD_M) if known is None else known
+    places = np.broadcast_to(place_sd_m, len(skeleton.markers)).copy()
     places[[label in _VIRTUAL_TRUNK for label in skeleton.labels]] = TRUNK_PLACE_SD_M
     return CalibrationPrior(uncertainty.coordinates, places, uncertainty.instruments, uncertainty.before)
 

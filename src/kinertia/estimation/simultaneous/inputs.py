@@ -79,9 +79,11 @@ class Layout:
     @classmethod
     def of(cls, unknowns: Iterable[Unknowns]) -> Self:
         """Arrange the terms' unknowns."""
-        ordered = tuple(sorted(unknowns, key=lambda one: one._order))
-        ends = np.cumsum([len(one.start) for one in ordered]).tolist()
-        places = {one.name: slice(end - len(one.start), end) for one, end in zip(ordered, ends, strict=True)}
+        ordered = tuple(sorted(unknowns, key=lambda unknown: unknown._order))
+        ends = np.cumsum([len(unknown.start) for unknown in ordered]).tolist()
+        places = {
+            unknown.name: slice(end - len(unknown.start), end) for unknown, end in zip(ordered, ends, strict=True)
+        }
         return cls(ordered, places)
 
     def __getitem__(self, name: str) -> slice:
@@ -89,65 +91,69 @@ class Layout:
 
     def _span(self, chosen: Iterable[Unknowns]) -> slice:
         """Return the slice from the first to the last of these unknowns, which are contiguous."""
-        places = [self[one.name] for one in chosen]
+        places = [self[unknown.name] for unknown in chosen]
         return slice(places[0].start, places[-1].stop) if places else slice(0, 0)
 
     @cached_property
     def errors(self) -> slice:
         """Slice of the errors of the ground reactions: all unknowns with a prior of being fault-free or faulty."""
-        return self._span(one for one in self.unknowns if isinstance(one.prior, ErrorPriors))
+        return self._span(unknown for unknown in self.unknowns if isinstance(unknown.prior, ErrorPriors))
 
     @cached_property
     def error_priors(self) -> ErrorPriors:
         """Priors of the unknowns in `errors`."""
-        return ErrorPriors.joined([one.prior for one in self.unknowns if isinstance(one.prior, ErrorPriors)])
+        return ErrorPriors.joined(
+            [unknown.prior for unknown in self.unknowns if isinstance(unknown.prior, ErrorPriors)]
+        )
 
     @cached_property
     def laboratory(self) -> slice:
         """Slice of the errors that other people of a session share."""
-        return self._span(one for one in self.unknowns if one.of_laboratory)
+        return self._span(unknown for unknown in self.unknowns if unknown.of_laboratory)
 
     @cached_property
     def displaced(self) -> slice:
         """Slice of the unknowns that have an offset in each trial."""
-        return self._span(one for one in self.unknowns if one.displaced_sd)
+        return self._span(unknown for unknown in self.unknowns if unknown.displaced_sd)
 
     @cached_property
     def in_root(self) -> slice:
         """Slice of the unknowns that the root equations depend on."""
-        return slice(0, self._span(one for one in self.unknowns if one.seen_by != "markers").stop)
+        return slice(0, self._span(unknown for unknown in self.unknowns if unknown.seen_by != "markers").stop)
 
     @cached_property
     def in_markers(self) -> slice:
         """Slice of the unknowns that the markers depend on."""
-        return self._span(one for one in self.unknowns if one.seen_by != "root")
+        return self._span(unknown for unknown in self.unknowns if unknown.seen_by != "root")
 
     @cached_property
     def size(self) -> int:
         """Number of unknowns."""
-        return sum(len(one.start) for one in self.unknowns)
+        return sum(len(unknown.start) for unknown in self.unknowns)
 
     @cached_property
     def start(self) -> np.ndarray:
         """Values (S,) from which the search starts."""
-        return np.concatenate([one.start for one in self.unknowns])
+        return np.concatenate([unknown.start for unknown in self.unknowns])
 
     @cached_property
     def weight(self) -> np.ndarray:
         """Information (S,) of normal priors about the start; zero for unknowns that have another prior."""
         return np.concatenate(
             [
-                1.0 / np.square(one.prior) if isinstance(one.prior, np.ndarray) else np.zeros(len(one.start))
-                for one in self.unknowns
+                1.0 / np.square(unknown.prior)
+                if isinstance(unknown.prior, np.ndarray)
+                else np.zeros(len(unknown.start))
+                for unknown in self.unknowns
             ]
         )
 
     def rigid(self, static: np.ndarray) -> np.ndarray:
         """Return the unknowns (S,) with those set to zero that rigid segments cannot represent."""
         result = static.copy()
-        for one in self.unknowns:
-            if not one.in_models:
-                result[self[one.name]] = 0.0
+        for unknown in self.unknowns:
+            if not unknown.in_models:
+                result[self[unknown.name]] = 0.0
         return result
 
 

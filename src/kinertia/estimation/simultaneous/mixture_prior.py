@@ -69,7 +69,7 @@ class FaultMixture:
         """
         if not 0.0 < self.fault_probability < 1.0:
             return float("inf")
-        sound, faulty = (float(np.hypot(sd, own)) for own in (self.nominal_sd, self.faulty_sd))
+        sound, faulty = (float(np.hypot(sd, error_sd)) for error_sd in (self.nominal_sd, self.faulty_sd))
         odds = np.log((1.0 - self.fault_probability) / self.fault_probability * faulty / sound)
         return float(np.sqrt(2.0 * odds / (sound**-2 - faulty**-2)))
 
@@ -100,10 +100,10 @@ class ErrorPriors:
     def joined(cls, every: Sequence[ErrorPriors]) -> ErrorPriors:
         """Concatenate the priors of several kinds of errors."""
         common, before = [], 0
-        for each in every:
-            common += [(prior, tuple(before + one for one in members)) for prior, members in each.common]
-            before += len(each.individual)
-        return cls(tuple(prior for each in every for prior in each.individual), tuple(common))
+        for priors in every:
+            common += [(prior, tuple(before + member for member in members)) for prior, members in priors.common]
+            before += len(priors.individual)
+        return cls(tuple(prior for priors in every for prior in priors.individual), tuple(common))
 
     @cached_property
     def parts(self) -> tuple[FaultMixture, ...]:
@@ -177,11 +177,11 @@ def _posterior(priors: Sequence[FaultMixture], data: np.ndarray, rhs: np.ndarray
     weight, middle, square = 0.0, np.zeros(len(rhs)), np.zeros_like(data)
     with_more = np.zeros(_MOST_WAYS)
     for ways in reversed(every):
-        own = np.exp(ways.log_weight - likeliest)
-        with_more = with_more[: len(own)] + own
-        weight += own.sum()
-        middle += own @ ways.centres
-        square += ways.squares(own, with_more)
+        weights = np.exp(ways.log_weight - likeliest)
+        with_more = with_more[: len(weights)] + weights
+        weight += weights.sum()
+        middle += weights @ ways.centres
+        square += ways.squares(weights, with_more)
         with_more = np.bincount(ways.before, with_more, _MOST_WAYS).astype(float)
     middle /= weight
     return middle, spread + square / weight - np.outer(middle, middle)
@@ -245,7 +245,7 @@ class _Faults:
     def of(cls, priors: Sequence[FaultMixture]) -> _Faults:
         """Return the faults of quantities with these priors."""
         share, nominal, faulty, mean = np.array(
-            [(one.fault_probability, one.nominal_sd, one.faulty_sd, one.faulty_mean) for one in priors]
+            [(prior.fault_probability, prior.nominal_sd, prior.faulty_sd, prior.faulty_mean) for prior in priors]
         ).T
         with np.errstate(divide="ignore"):
             log_odds = np.log(share / (1.0 - share)) + np.log(nominal / faulty) - 0.5 * np.square(mean / faulty)
@@ -295,8 +295,8 @@ class _Ways:
         log_weight = self.log_weight[:, None] + faults.log_odds - 0.5 * (np.log(left) + away / left)
         log_weight[self.off] = -np.inf
         before, fault = self._likeliest(log_weight, least, min(_MOST_WAYS, max(_FEWEST_WAYS, _MOST_NUMBERS // k**2)))
-        columns, shares, each = self.columns[before], self.shares[before], np.arange(len(before))
-        column = spread[fault] - np.einsum("nf,nfk->nk", shares * columns[each, :, fault], columns)
+        columns, shares, rows = self.columns[before], self.shares[before], np.arange(len(before))
+        column = spread[fault] - np.einsum("nf,nfk->nk", shares * columns[rows, :, fault], columns)
         share, step = ((part / left)[before, fault][:, None] for part in (np.broadcast_to(change, left.shape), moved))
         return _Ways(
             self.off[before] | np.eye(k, dtype=bool)[fault],
@@ -326,9 +326,9 @@ class _Ways:
         once = np.sort(same[new])[:most]
         return before[once], fault[once]
 
-    def squares(self, own: np.ndarray, with_more: np.ndarray) -> np.ndarray:
-        """Return the sum (k, k) of squared means weighted with `own` (n,), less the last faults' with `with_more`."""
-        result: np.ndarray = (own * self.centres.T) @ self.centres
+    def squares(self, weights: np.ndarray, with_more: np.ndarray) -> np.ndarray:
+        """Return the sum (k, k) of squared means weighted by `weights` (n,), less the last faults by `with_more`."""
+        result: np.ndarray = (weights * self.centres.T) @ self.centres
         if self.shares.size:
             result -= (with_more * self.shares[:, -1] * self.columns[:, -1].T) @ self.columns[:, -1]
         return result

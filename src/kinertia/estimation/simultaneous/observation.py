@@ -181,16 +181,18 @@ def observe(
         mass_kg: for the size of force errors.
         bandwidths: per trial, of motion and forces.
     """
-    errors = [_errors(skeleton, each) for each in trials]
-    rates = [each.trial.markers.rate_hz for each in trials]
-    skin = skin_patterns(skeleton, [each.smooth for each in errors], [bool(each.trial.loads.plates) for each in trials])
-    usual = [root_mean_square(each.varying) for each in errors]
-    frames = [correlated_frames(each.varying, sd) for each, sd in zip(errors, usual, strict=True)]
-    places = np.stack([each.displaced for each in errors])
-    rest = WithoutSkin.of([each.varying for each in errors], places, skin, frames)
+    errors = [_errors(skeleton, trial) for trial in trials]
+    rates = [trial.trial.markers.rate_hz for trial in trials]
+    skin = skin_patterns(
+        skeleton, [error.smooth for error in errors], [bool(trial.trial.loads.plates) for trial in trials]
+    )
+    usual = [root_mean_square(error.varying) for error in errors]
+    frames = [correlated_frames(error.varying, sd) for error, sd in zip(errors, usual, strict=True)]
+    places = np.stack([error.displaced for error in errors])
+    rest = WithoutSkin.of([error.varying for error in errors], places, skin, frames)
     pairs = [
-        _observed(skeleton, each, bandwidth, *marked, mass_kg)
-        for each, bandwidth, marked in zip(
+        _observed(skeleton, trial, bandwidth, *marked, mass_kg)
+        for trial, bandwidth, marked in zip(
             trials, bandwidths, zip(errors, rest.varying, skin, frames, strict=True), strict=True
         )
     ]
@@ -199,13 +201,17 @@ def observe(
     # where root equations hold, whose errors recur with them: other strides of the markers repeat no force
     alike = [
         repeats([weighed(e, o.marker_sd)[o.near_windows] for e, (o, _) in zip(every, pairs, strict=True)], rates)
-        for every in ([each.varying for each in errors], rest.varying)
+        for every in ([error.varying for error in errors], rest.varying)
     ]
     counts = np.maximum(*alike)
     by_label = dict(zip(skeleton.labels, map(float, displaced), strict=True))
     noise = [
-        replace(one, repeats=float(count), displacement_sd_m={label: by_label[label] for label in one.sd_m})
-        for (_, one), count in zip(pairs, counts.sum(axis=1), strict=True)
+        replace(
+            noise_of_trial,
+            repeats=float(count),
+            displacement_sd_m={label: by_label[label] for label in noise_of_trial.sd_m},
+        )
+        for (_, noise_of_trial), count in zip(pairs, counts.sum(axis=1), strict=True)
     ]
     pooled = tuple(replace(o, displacement_sd_m=displaced) for o, _ in pairs)
     return Observations(pooled, tuple(noise), _misplaced(skeleton, rest.displaced), counts)
@@ -241,9 +247,11 @@ def _spread(skeleton: Skeleton, apart: np.ndarray, freedom: np.ndarray) -> np.nd
     alike = markers_in_common(skeleton, apart)
     result = np.zeros(len(alike))
     for segment in np.unique(skeleton.marker_segments):
-        own = skeleton.marker_segments == segment
-        if freedom[own].any():
-            result[own] = np.sqrt(alike[own] * np.square(apart[:, own]).sum() / freedom[own].sum())
+        of_segment = skeleton.marker_segments == segment
+        if freedom[of_segment].any():
+            result[of_segment] = np.sqrt(
+                alike[of_segment] * np.square(apart[:, of_segment]).sum() / freedom[of_segment].sum()
+            )
     return result
 
 

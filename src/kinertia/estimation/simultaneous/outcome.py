@@ -106,16 +106,16 @@ def result_of(
         static=values,
         covariance=covariance,
         there=ended.here.point.static,
-        displaced=tuple(sd * own for sd, own in zip(problem.displaced_sd, ended.point.displaced, strict=True)),
+        displaced=tuple(sd * offsets for sd, offsets in zip(problem.displaced_sd, ended.point.displaced, strict=True)),
         gaussian=ended.instruments,
         moved=support.moved,
         contradicted=support.contradicted,
     )
     read = problem.read(solution)
-    entries = tuple(entry for each in read for entry in each.pop("calibration", ()))
+    entries = tuple(entry for values_of_term in read for entry in values_of_term.pop("calibration", ()))
     trials = range(len(problem.trials))
     return SimultaneousResult(
-        **{name: value for each in read for name, value in each.items()},
+        **{name: value for values_of_term in read for name, value in values_of_term.items()},
         calibration=entries,
         skeleton=problem.model.locked(values),
         foot_loads=tuple(problem.loads.on_feet(k, values) for k in trials),

@@ -164,7 +164,7 @@ def _left_out(problem: MapProblem, model: GaussNewton, static: np.ndarray) -> tu
     It returns its change (S,), and a root (S, u) of what is added to its covariance.
     """
     directions = problem.left_out(static)
-    data = sum(each.information for each in model.displaced) @ directions
+    data = sum(eliminated.information for eliminated in model.displaced) @ directions
     pull = -directions.T @ problem.prior_slope(static)[0]
     root = model.static.root_of_covariance()
     return with_left_out(directions, data, pull, root @ root.T)
@@ -372,8 +372,8 @@ def _uncertainty(
     """
     root, point, of_curves, noises = model.static.root_of_covariance(), ended.point, [], []
     roots, more = uncertain
-    for k, (trial, own) in enumerate(zip(ended.here.trials, roots, strict=True)):
-        in_trial = np.hstack([model.in_trial(k, more), own])
+    for k, (trial, root_in_trial) in enumerate(zip(ended.here.trials, roots, strict=True)):
+        in_trial = np.hstack([model.in_trial(k, more), root_in_trial])
         here = point.coefficients[k], problem.in_trial(k, point)
         # errors that recur count more often only for what does not move
         noises.append(motion_noise(problem, k, *here) / problem.trials[k].repeats)
@@ -389,7 +389,9 @@ def _roots_in_trials(problem: MapProblem, ended: Ended, model: GaussNewton) -> l
     for k, trial in enumerate(here.trials):
         in_trial, sd = root, problem.displaced_sd[k]
         if sd.any():
-            elsewhere = here.information + sum(each.information for j, each in enumerate(model.displaced) if j != k)
+            elsewhere = here.information + sum(
+                eliminated.information for j, eliminated in enumerate(model.displaced) if j != k
+            )
             elsewhere[layout.errors, layout.errors] += ended.instruments.precision
             elsewhere = as_displaced(elsewhere, layout.displaced, sd)
             in_trial = StaticInformation.of(trial.information + elsewhere, first).root_of_covariance()

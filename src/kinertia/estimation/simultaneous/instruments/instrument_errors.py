@@ -131,8 +131,8 @@ class CalibrationEntry:
         return self.notable and self.moves_moments and not self.contradicted_by
 
     def __str__(self) -> str:
-        of = item_text(self.kind, self.plate, self.joint)
-        return f"{of}: {quantity_text(self.quantity, self.axis, self.trial)}"
+        item = item_text(self.kind, self.plate, self.joint)
+        return f"{item}: {quantity_text(self.quantity, self.axis, self.trial)}"
 
 
 def item_text(kind: str, plate: str | None, joint: str | None = None) -> str:
@@ -149,7 +149,7 @@ def quantity_text(quantity: str, axis: str | None, trial: str | None = None) -> 
 def calibration_columns(entries: Iterable[CalibrationEntry]) -> dict[str, list[Any]]:
     """Return the table of calibrated quantities, by column."""
     entries = list(entries)
-    return {field.name: [getattr(one, field.name) for one in entries] for field in fields(CalibrationEntry)}
+    return {field.name: [getattr(entry, field.name) for entry in entries] for field in fields(CalibrationEntry)}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -202,14 +202,14 @@ def instrument_errors(
     moved, contradicted = support
     elsewhere = _session_says_otherwise(found.instruments, prior)
     shared = list(laboratory_errors(found.plates, found.delay_s, prior))
-    own = {(one.plate, one.quantity, one.axis): one for _, _, one in shared}
+    by_key = {(entry.plate, entry.quantity, entry.axis): entry for _, _, entry in shared}
     errors = []
-    for place, value, one in (*shared, *_of_trials(found, prior, trials, own_place)):
-        columns = _same_column(one.plate, list(found.plates)) if one.trial is None else []
-        others = [own[column, one.quantity, one.axis] for column in columns]
-        by_trial = contradicted[place] or any(_apart(one, other) for other in others)
+    for place, value, entry in (*shared, *_of_trials(found, prior, trials, own_place)):
+        columns = _same_column(entry.plate, list(found.plates)) if entry.trial is None else []
+        others = [by_key[column, entry.quantity, entry.axis] for column in columns]
+        by_trial = contradicted[place] or any(_apart(entry, other) for other in others)
         said = ANOTHER_TRIAL if by_trial else OTHER_PEOPLE if place in elsewhere else None
-        errors.append(replace(one, moved=float(moved[place]) * abs(value), contradicted_by=said))
+        errors.append(replace(entry, moved=float(moved[place]) * abs(value), contradicted_by=said))
     return tuple(errors)
 
 
@@ -233,7 +233,7 @@ def laboratory_errors(
             common_sd = prior.floor[unknown].sd if unknown in prior.floor else 0.0
             prior_sd = float(np.hypot(prior.plate[unknown].sd, common_sd))
             errors.append(_of_plate(next(places), unknown, value, prior_sd, sd, plate=plate))
-    yield from sorted(errors, key=lambda one: one.entry.quantity != ROTATION)
+    yield from sorted(errors, key=lambda error: error.entry.quantity != ROTATION)
     yield _delay(len(errors) + len(FLOOR_UNKNOWNS), delay_s, prior.delay_s.sd)
 
 
@@ -299,20 +299,22 @@ def _same_column(plate: str | None, plates: Sequence[str]) -> list[str]:
     return [other for column in columns if plate in column for other in column if other != plate]
 
 
-def _apart(one: CalibrationEntry, other: CalibrationEntry) -> bool:
-    return abs(one.value - other.value) > INTERVAL_SD * float(np.hypot(one.sd, other.sd))
+def _apart(calibration_entry: CalibrationEntry, other: CalibrationEntry) -> bool:
+    return abs(calibration_entry.value - other.value) > INTERVAL_SD * float(np.hypot(calibration_entry.sd, other.sd))
 
 
-def _session_says_otherwise(own: InstrumentInformation, prior: InstrumentPrior) -> set[int]:
+def _session_says_otherwise(of_person: InstrumentInformation, prior: InstrumentPrior) -> set[int]:
     """Return the laboratory's unknowns for which these trials and the session's other people disagree."""
     if not prior.session:
         return set()
-    (value, sd), (others, others_sd) = (_alone(each, prior) for each in (own, prior.of_session(own.plates)))
+    (value, sd), (others, others_sd) = (
+        _alone(information, prior) for information in (of_person, prior.of_session(of_person.plates))
+    )
     return set(np.flatnonzero(np.abs(value - others) > INTERVAL_SD * np.hypot(sd, others_sd)).tolist())
 
 
 def _alone(shown: InstrumentInformation, prior: InstrumentPrior) -> tuple[np.ndarray, np.ndarray]:
     """Return values (k,) and standard deviations (k,) from some trials alone, if any instrument may be faulty."""
-    faulty = np.array([one.faulty_sd for one in prior.of_unknowns(shown.plates).individual])
+    faulty = np.array([prior_of_error.faulty_sd for prior_of_error in prior.of_unknowns(shown.plates).individual])
     covariance = np.linalg.inv(shown.information + np.diag(faulty**-2.0))
     return covariance @ shown.rhs, np.sqrt(np.diag(covariance))

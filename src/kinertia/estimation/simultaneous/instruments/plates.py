@@ -70,11 +70,11 @@ _SWING_S = 0.1
 
 def plates_with_floor(count: int) -> np.ndarray:
     """Return the matrix (5 p, 5 p + 3) from the plates' own and common unknowns to PLATE_ERRORS of p plates."""
-    own, floor = (
+    on_plate, floor = (
         np.array([[name == unknown for name in names] for unknown in PLATE_ERRORS], dtype=float)
         for names in (PLATE_UNKNOWNS, FLOOR_UNKNOWNS)
     )
-    return np.hstack([np.kron(np.eye(count), own), np.tile(floor, (count, 1))])
+    return np.hstack([np.kron(np.eye(count), on_plate), np.tile(floor, (count, 1))])
 
 
 def plate_middles(loads: FootLoads, used: np.ndarray) -> np.ndarray:
@@ -91,9 +91,11 @@ def plate_middles(loads: FootLoads, used: np.ndarray) -> np.ndarray:
 
 def turned_loads(loads: np.ndarray, middle: np.ndarray, angle_rad: np.ndarray | float) -> np.ndarray:
     """Rotate loads (..., 6) about the vertical through points (..., 3) m by angles (...) rad."""
-    cosine, sine = (np.asarray(each)[..., None] for each in (np.cos(angle_rad), np.sin(angle_rad)))
+    cosine, sine = (np.asarray(value)[..., None] for value in (np.cos(angle_rad), np.sin(angle_rad)))
     force, moment = loads[..., :3], loads[..., 3:] - np.cross(middle, loads[..., :3])
-    force, moment = (_UP * each + cosine * (each - _UP * each) + sine * np.cross(_UP, each) for each in (force, moment))
+    force, moment = (
+        _UP * vector + cosine * (vector - _UP * vector) + sine * np.cross(_UP, vector) for vector in (force, moment)
+    )
     return np.concatenate([force, moment + np.cross(middle, force)], axis=-1)
 
 
@@ -124,12 +126,12 @@ class FootPlates:
         """Return the reactions with these plates (a session's), which include its own."""
         if not self.plates:  # a trial without forces: nobody stands on the first
             return replace(self, plates=tuple(plates), middles=np.zeros((len(plates), 3)))
-        own = np.array([plates.index(name) for name in self.plates])
+        column = np.array([plates.index(name) for name in self.plates])
         middles = np.zeros((len(plates), 3))
-        middles[own] = self.middles
-        reactions = replace(self.reactions, plate_index=own[self.reactions.plate_index])
+        middles[column] = self.middles
+        reactions = replace(self.reactions, plate_index=column[self.reactions.plate_index])
         return replace(
-            self, plates=tuple(plates), plate_index=own[self.plate_index], reactions=reactions, middles=middles
+            self, plates=tuple(plates), plate_index=column[self.plate_index], reactions=reactions, middles=middles
         )
 
     def by_plate(
@@ -171,17 +173,17 @@ def corrected_loads(
         middles: (p, 3) m, centres of their rotation.
         turn: (3, 3) rotation from the laboratory's axes to the axes of the loads.
     """
-    result, own, push = np.empty(loads.shape), np.empty(6), np.empty(6)
+    result, load, push = np.empty(loads.shape), np.empty(6), np.empty(6)
     for i in range(loads.shape[0]):
         for foot in range(loads.shape[1]):
             plate = plate_index[i, foot]
             for k in range(6):
-                own[k] = loads[i, foot, k]
+                load[k] = loads[i, foot, k]
             for zero, axis in ((ZERO_X, 0), (ZERO_Z, 2)):
                 _push(axis, middles[plate], turn, push)
                 for k in range(6):
-                    own[k] -= loaded[i, foot] * plates[plate, zero] * push[k]
-            _correct(own, middles[plate], plates[plate], turn, result[i, foot])
+                    load[k] -= loaded[i, foot] * plates[plate, zero] * push[k]
+            _correct(load, middles[plate], plates[plate], turn, result[i, foot])
     return result
 
 
@@ -210,16 +212,16 @@ def by_plate(
     for i in range(n):
         for foot in range(feet):
             plate = plate_index[i, foot]
-            own, load = result[i, foot, :, plate], loads[i, foot]
+            derivatives, load = result[i, foot, :, plate], loads[i, foot]
             for r in range(3):
                 place[r] = middles[plate, r] + plates[plate, X] * turn[r, 0] + plates[plate, Z] * turn[r, 2]
-            _by_place(load, turn, own)
-            _by_turn(load, place, own)
-            own[4, FREE_MOMENT] = load[1]
+            _by_place(load, turn, derivatives)
+            _by_turn(load, place, derivatives)
+            derivatives[4, FREE_MOMENT] = load[1]
             for k in range(6):
-                own[k, GAIN] = load[k] / (1.0 + plates[plate, GAIN])
-                own[k, ZERO_X] = -loaded[i, foot] * pushed[plate, 0, k]
-                own[k, ZERO_Z] = -loaded[i, foot] * pushed[plate, 1, k]
+                derivatives[k, GAIN] = load[k] / (1.0 + plates[plate, GAIN])
+                derivatives[k, ZERO_X] = -loaded[i, foot] * pushed[plate, 0, k]
+                derivatives[k, ZERO_Z] = -loaded[i, foot] * pushed[plate, 1, k]
     return result
 
 
@@ -302,12 +304,12 @@ def impact_factors(
     for first, last in runs(dynamic):
         if last - first + 1 < _FEWEST_FRAMES:
             continue
-        own = slice(first, last + 1)
+        contact = slice(first, last + 1)
         step_s = (time[last] - time[first]) / (last - first)
         spacing = max(spacing_s, 2.0 * step_s)
-        left = _left(time[own], force[own], spacing)
+        left = _left(time[contact], force[contact], spacing)
         near = greatest(left, 1 + 2 * round(0.5 * spacing / step_s))
-        result[own] = np.sqrt(1.0 + np.square(_BESIDE * near / force_sd))
+        result[contact] = np.sqrt(1.0 + np.square(_BESIDE * near / force_sd))
     return result
 
 

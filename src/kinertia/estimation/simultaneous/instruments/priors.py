@@ -89,8 +89,8 @@ class InstrumentInformation:
         `before` holds information and right-hand side of each source of prior knowledge.
         """
         after = np.linalg.inv(covariance)
-        information = after - sum(each for each, _ in before)
-        rhs = after @ mean - sum(each for _, each in before)
+        information = after - sum(known_information for known_information, _ in before)
+        rhs = after @ mean - sum(known_rhs for _, known_rhs in before)
         return cls(tuple(plates), *_never_negative(information, rhs, np.sqrt(np.diag(after))))
 
     def without_own(self, sd: np.ndarray) -> InstrumentInformation:
@@ -100,25 +100,27 @@ class InstrumentInformation:
         """
         size = len(self.rhs) - len(sd)
         across = self.information[:size, size:]
-        own = self.information[size:, size:] + np.diag(1.0 / np.square(sd))
-        through = np.linalg.solve(own, np.column_stack([across.T, self.rhs[size:]]))
+        specific = self.information[size:, size:] + np.diag(1.0 / np.square(sd))
+        through = np.linalg.solve(specific, np.column_stack([across.T, self.rhs[size:]]))
         information = self.information[:size, :size] - across @ through[:, :-1]
         return InstrumentInformation(self.plates, information, self.rhs[:size] - across @ through[:, -1])
 
     def among(self, plates: Sequence[str], prior: InstrumentPrior) -> InstrumentInformation:
         """Convert to these plates; a plate that is not among them contributes no more than its prior."""
         every = tuple(dict.fromkeys([*plates, *self.plates]))
-        each = len(PLATE_UNKNOWNS)
-        here = np.concatenate([each * every.index(name) + np.arange(each) for name in self.plates]).astype(int)
-        size = each * len(every)
+        per_plate = len(PLATE_UNKNOWNS)
+        here = np.concatenate([per_plate * every.index(name) + np.arange(per_plate) for name in self.plates]).astype(
+            int
+        )
+        size = per_plate * len(every)
         here = np.concatenate([here, size + np.arange(len(FLOOR_UNKNOWNS) + 1)])
         information, rhs = np.zeros((size + len(FLOOR_UNKNOWNS) + 1,) * 2), np.zeros(size + len(FLOOR_UNKNOWNS) + 1)
         information[np.ix_(here, here)], rhs[here] = self.information, self.rhs
-        other = np.arange(each * len(plates), size)
+        other = np.arange(per_plate * len(plates), size)
         kept = np.setdiff1d(np.arange(len(rhs)), other)
         deviations = np.tile([prior.plate[name].sd for name in PLATE_UNKNOWNS], len(every) - len(plates))
-        own = information[np.ix_(other, other)] + np.diag(1.0 / np.square(deviations))
-        through = np.linalg.solve(own, np.column_stack([information[np.ix_(other, kept)], rhs[other]]))
+        eliminated = information[np.ix_(other, other)] + np.diag(1.0 / np.square(deviations))
+        through = np.linalg.solve(eliminated, np.column_stack([information[np.ix_(other, kept)], rhs[other]]))
         across = information[np.ix_(kept, other)]
         return InstrumentInformation(
             tuple(plates),
@@ -197,7 +199,7 @@ class InstrumentPrior:
         same one: the common part of their faults has a prior, too.
         """
         names = list(PLATE_UNKNOWNS)
-        own = [self._nominal(self.plate[name], plate, name) for plate in plates for name in names]
+        individual = [self._nominal(self.plate[name], plate, name) for plate in plates for name in names]
         common = [
             (FaultMixture(_HARDLY * prior.nominal_sd, prior.faulty_sd, prior.fault_probability), tuple(places))
             for column in columns_of_several_trials(plates)
@@ -205,7 +207,7 @@ class InstrumentPrior:
             if (places := [len(names) * plate + k for plate in column]) and prior.fault_probability > 0.0
         ]
         floor = [self.floor[name] for name in FLOOR_UNKNOWNS]
-        return ErrorPriors((*own, *floor, self.delay_s), tuple(common))
+        return ErrorPriors((*individual, *floor, self.delay_s), tuple(common))
 
     def trial_gain_of(self, plate: str) -> FaultMixture:
         """Return the prior of a plate's additional gain error in each trial."""
@@ -219,8 +221,8 @@ class InstrumentPrior:
         """Return the information of the session's other people on these plates, combined."""
         size = len(PLATE_UNKNOWNS) * len(plates) + len(FLOOR_UNKNOWNS) + 1
         information, rhs = np.zeros((size, size)), np.zeros(size)
-        for each in self.session:
-            shown = each.among(plates, self)
+        for person in self.session:
+            shown = person.among(plates, self)
             information += shown.information
             rhs += shown.rhs
         return InstrumentInformation(tuple(plates), information, rhs)

@@ -93,31 +93,31 @@ class BlockBand:
 def _forward(diagonal: Float3, below: Float3, x: Float2) -> None:
     """Replace x (b, k) by L^-1 x. For a single column, calling BLAS would take six times as long."""
     for n in range(len(x)):
-        own, before = x[n], x[n - 1]
-        for i in range(len(own)):
+        block, before = x[n], x[n - 1]
+        for i in range(len(block)):
             total = 0.0
             if n:
-                for j in range(len(own)):
+                for j in range(len(block)):
                     total += below[n - 1, i, j] * before[j]
             for j in range(i):
-                total += diagonal[n, i, j] * own[j]
-            own[i] = (own[i] - total) / diagonal[n, i, i]
+                total += diagonal[n, i, j] * block[j]
+            block[i] = (block[i] - total) / diagonal[n, i, i]
 
 
 @compiled_sums
 def _backward(diagonal: Float3, below: Float3, x: Float2) -> None:
     """Replace x (b, k) by L^-T x."""
     for n in range(len(x) - 1, -1, -1):
-        own = x[n]
-        for i in range(len(own) if n + 1 < len(x) else 0):
+        block = x[n]
+        for i in range(len(block) if n + 1 < len(x) else 0):
             known = x[n + 1, i]
-            for j in range(len(own)):
-                own[j] -= below[n, i, j] * known
-        for i in range(len(own) - 1, -1, -1):
-            known = own[i] / diagonal[n, i, i]
-            own[i] = known
+            for j in range(len(block)):
+                block[j] -= below[n, i, j] * known
+        for i in range(len(block) - 1, -1, -1):
+            known = block[i] / diagonal[n, i, i]
+            block[i] = known
             for j in range(i):
-                own[j] -= diagonal[n, i, j] * known
+                block[j] -= diagonal[n, i, j] * known
 
 
 def cholesky(matrix: np.ndarray) -> None:
@@ -158,11 +158,11 @@ def subtract_product(target: np.ndarray, left: np.ndarray, rhs: np.ndarray, tran
 
 
 def _call(name: str, *arguments: _Argument) -> None:
-    arrays = [each for each in arguments if isinstance(each, np.ndarray) and each.dtype.kind == "f"]
+    arrays = [argument for argument in arguments if isinstance(argument, np.ndarray) and argument.dtype.kind == "f"]
     precision = arrays[0].dtype
-    assert all(each.flags.c_contiguous and each.dtype == precision for each in arrays)
+    assert all(array.flags.c_contiguous and array.dtype == precision for array in arrays)
     letter = "s" if precision == np.float32 else "d"
-    _routine(letter + name, len(arguments))(*(_address(each, letter) for each in arguments))
+    _routine(letter + name, len(arguments))(*(_address(argument, letter) for argument in arguments))
 
 
 def _address(argument: _Argument, letter: str) -> int:

@@ -75,8 +75,8 @@ class Factored:
     def in_blocks(self, motion: np.ndarray) -> np.ndarray:
         """Extract the blocks (b, k, 1) of these splines from values (size, c) of all splines of the trial."""
         blocks, wide = self.band.diagonal.shape[:2]
-        flat, own = np.zeros(blocks * wide), motion[self.splines].ravel()
-        flat[: len(own)] = own
+        flat, values = np.zeros(blocks * wide), motion[self.splines].ravel()
+        flat[: len(values)] = values
         return np.ascontiguousarray(self.in_order(flat.reshape(blocks, wide, 1)))
 
     def in_order(self, blocks: np.ndarray) -> np.ndarray:
@@ -109,7 +109,7 @@ class Branch:
     @classmethod
     def of(
         cls,
-        of: Callable[[TimeBlock], NormalEquations],
+        equations_of: Callable[[TimeBlock], NormalEquations],
         done: Callable[[NormalEquations], None],
         damping: float,
         precision: type[np.floating],
@@ -118,10 +118,10 @@ class Branch:
         """Eliminate time blocks in this order, backwards if the first is not the beginning of the trial."""
         backwards, end, kept = time_blocks[0].splines.start > 0, None, KeptArrays()
         for k, time_block in enumerate(time_blocks):
-            normal = of(time_block)
+            normal = equations_of(time_block)
             s = normal.border.shape[2]
             if k == 0:
-                size = max(each.touched.stop for each in time_blocks)
+                size = max(block.touched.stop for block in time_blocks)
                 whole = Gradient.zero(size, normal.rhs.shape[1], len(normal.static_rhs))
                 diagonal, information = np.zeros(s), np.zeros((s, s))
             whole.add(normal, time_block.touched)
@@ -200,7 +200,7 @@ class Eliminated:
     def of(
         cls,
         time_blocks: Sequence[TimeBlock],
-        of: Callable[[TimeBlock], NormalEquations],
+        equations_of: Callable[[TimeBlock], NormalEquations],
         done: Callable[[NormalEquations], None],
         damping: float,
         precise: bool = False,
@@ -209,16 +209,16 @@ class Eliminated:
 
         Args:
             time_blocks: time blocks of the trial.
-            of: makes the normal equations of one block.
+            equations_of: makes the normal equations of one block.
             done: called with them when they are no longer needed.
             damping: share by which the motion's diagonal is raised.
             precise: with the border in double precision.
         """
         if precise:
-            return cls._of(time_blocks, partial(Branch.of, of, done, damping, np.float64))
-        result = cls._of(time_blocks, partial(Branch.of, of, done, damping, np.float32))
+            return cls._of(time_blocks, partial(Branch.of, equations_of, done, damping, np.float64))
+        result = cls._of(time_blocks, partial(Branch.of, equations_of, done, damping, np.float32))
         if (result.static_diagonal > UNSAFE * np.diag(result.information)).any():
-            return cls.of(time_blocks, of, done, damping, precise=True)
+            return cls.of(time_blocks, equations_of, done, damping, precise=True)
         return result
 
     @classmethod
@@ -228,7 +228,9 @@ class Eliminated:
         whole = Gradient.zero(size, c, len(branches[0].gradient.static_rhs))
         for branch in branches:
             whole.add(branch.gradient, slice(0, len(branch.gradient.rhs)))
-        diagonal, border = (sum(getattr(each.end, name) for each in branches) for name in ("diagonal", "border"))
+        diagonal, border = (
+            sum(getattr(half_branch.end, name) for half_branch in branches) for name in ("diagonal", "border")
+        )
         start = branches[0].last.splines.stop
         splines = slice(start, min(start + SPLINES_PER_BLOCK, size))
         band = BlockBand.factor(diagonal[None], np.zeros((0, *diagonal.shape)))
@@ -285,8 +287,8 @@ def write_step(
     """
     rows = part.border @ static.astype(part.border.dtype)
     step = part.band.backward(motion - rows[..., None], after, in_place=True)
-    own = into[part.splines]
-    own[:] = part.in_order(step).reshape(-1, own.shape[1])[: len(own)]
+    target = into[part.splines]
+    target[:] = part.in_order(step).reshape(-1, target.shape[1])[: len(target)]
     return step
 
 
@@ -341,26 +343,29 @@ def _blocks(band: Float4, count: int, damping: float, backwards: bool) -> tuple[
     They run from the first to the last or backwards; diagonal elements are one beyond the end of the band.
     """
     size, wide, c, _ = band.shape
-    each = SPLINES_PER_BLOCK
-    diagonal, below = np.zeros((count, each * c, each * c)), np.zeros((count - 1, each * c, each * c))
+    per_block = SPLINES_PER_BLOCK
+    diagonal, below = (
+        np.zeros((count, per_block * c, per_block * c)),
+        np.zeros((count - 1, per_block * c, per_block * c)),
+    )
     for spline in range(size):
-        i, block = spline % each, count - 1 - spline // each if backwards else spline // each
+        i, block = spline % per_block, count - 1 - spline // per_block if backwards else spline // per_block
         for offset in range(min(wide, size - spline)):
             j = i + offset
             for row in range(c):
                 for column in range(c):
                     value = band[spline, offset, row, column]
-                    if j >= each and backwards:
-                        below[block - 1, i * c + row, (j - each) * c + column] = value
-                    elif j >= each:
-                        below[block, (j - each) * c + column, i * c + row] = value
+                    if j >= per_block and backwards:
+                        below[block - 1, i * c + row, (j - per_block) * c + column] = value
+                    elif j >= per_block:
+                        below[block, (j - per_block) * c + column, i * c + row] = value
                     else:
                         diagonal[block, i * c + row, j * c + column] = value
                         diagonal[block, j * c + column, i * c + row] = value
         for row in range(c):
             diagonal[block, i * c + row, i * c + row] *= 1.0 + damping
-    for spline in range(size, count * each):
+    for spline in range(size, count * per_block):
         for row in range(c):
-            place = spline % each * c + row
+            place = spline % per_block * c + row
             diagonal[0 if backwards else count - 1, place, place] = 1.0
     return diagonal, below

@@ -73,9 +73,9 @@ def time_blocks(basis: MotionBasis, most: int) -> tuple[TimeBlock, ...]:
     """
     size, whole = basis.size, SPLINES_PER_BLOCK
     blocks = size // whole + 1
-    each = max(min(most // whole, blocks // 2), 1) * whole
+    block_size = max(min(most // whole, blocks // 2), 1) * whole
     # the last has more splines than the block that the one before it touches
-    starts = list(range(0, size - whole, each)) or [0]
+    starts = list(range(0, size - whole, block_size)) or [0]
     ends = [*starts[1:], size]
     frames = [int(np.searchsorted(basis.first, spline)) for spline in (*starts, size)]
     return tuple(
@@ -95,7 +95,7 @@ def joined(half: Sequence[TimeBlock]) -> list[TimeBlock]:
     result: list[TimeBlock] = []
     for time_block in half:
         if result and result[-1].frames.stop - result[-1].frames.start < _FRAMES_OF_GRADIENT:
-            first, last = sorted((result.pop(), time_block), key=lambda each: each.frames.start)
+            first, last = sorted((result.pop(), time_block), key=lambda block: block.frames.start)
             time_block = TimeBlock(*(slice(getattr(first, name).start, getattr(last, name).stop) for name in _SLICES))
         result.append(time_block)
     return result

@@ -52,14 +52,15 @@ class MotionBasis:
     """
 
     def __init__(self, time: np.ndarray, spacing_s: float, phase: float = 0.0, part: slice = slice(None)) -> None:
-        own = time[part]
-        length = own[-1] - own[0]
-        count = min(max(1, int(np.ceil(length / spacing_s * (1.0 - _ROUNDING)))), (len(own) - 1) // 2)
+        window_time = time[part]
+        length = window_time[-1] - window_time[0]
+        count = min(max(1, int(np.ceil(length / spacing_s * (1.0 - _ROUNDING)))), (len(window_time) - 1) // 2)
         before, after = (
-            int(np.ceil(more / length * count - _ROUNDING)) for more in (own[0] - time[0], time[-1] - own[-1])
+            int(np.ceil(more / length * count - _ROUNDING))
+            for more in (window_time[0] - time[0], time[-1] - window_time[-1])
         )
         step = length / (count - phase)
-        begin = own[0] - (before + phase) * step
+        begin = window_time[0] - (before + phase) * step
         count += before + after
         knots = begin + step * np.arange(-_DEGREE, count + _ACTIVE)
         self.intervals = count

@@ -94,8 +94,8 @@ class NormalEquations(Gradient):
     @classmethod
     def bytes_per_spline(cls, coordinates: int, static: int) -> int:
         """Return the memory (bytes) of one spline, with so many coordinates and static unknowns."""
-        one = cls.zero(1, coordinates, static)
-        return one.band.nbytes + one.border.nbytes
+        single = cls.zero(1, coordinates, static)
+        return single.band.nbytes + single.border.nbytes
 
 
 class EquationsPool:
@@ -185,15 +185,15 @@ def to_splines(
     interval are left for the next one. The border is left out if not `bordered`.
     """
     n, size, c, at, most = len(first), len(band), rhs.shape[1], first[start], len(interval.gradient)
-    own = np.zeros((1 + LATER, most, _TOGETHER))
+    spline_values = np.zeros((1 + LATER, most, _TOGETHER))
     for k in range(start, end):
         for later in range(min(LATER, n - 1 - k) + 1):
             for i in range(6):
-                own[later, k - start, first[k + later] - at + i] = values[k + later, i]
+                spline_values[later, k - start, first[k + later] - at + i] = values[k + later, i]
         for i in range(6):
             for j in range(c):
-                rhs[at + i, j] += own[0, k - start, i] * interval.gradient[k - start, j]
-    products, pair = np.dot(_pair_weights(own), interval.squares), 0
+                rhs[at + i, j] += spline_values[0, k - start, i] * interval.gradient[k - start, j]
+    products, pair = np.dot(_pair_weights(spline_values), interval.squares), 0
     for i in range(_TOGETHER):
         for j in range(i, _TOGETHER):
             if at + j < size:
@@ -207,7 +207,12 @@ def to_splines(
             begin, stop = reach[j, run, 0], reach[j, run, 1]
             if begin < stop:
                 for i in range(6):
-                    _weigh(own[0, :, i], end - start, interval.across[:, j, begin:stop], border[at + i, j, begin:stop])
+                    _weigh(
+                        spline_values[0, :, i],
+                        end - start,
+                        interval.across[:, j, begin:stop],
+                        border[at + i, j, begin:stop],
+                    )
                 _pass_on(end - start, interval.across[:, j, begin:stop])
 
 
@@ -235,20 +240,20 @@ def _pass_on(count: int, across: np.ndarray) -> None:
 
 
 @part
-def _pair_weights(own: np.ndarray) -> np.ndarray:
+def _pair_weights(spline_values: np.ndarray) -> np.ndarray:
     """Compute weights (28, 5 f) of `Interval.squares` for each pair of splines, the second not before the first.
 
     They come from the splines (3, f, 7) in each frame and in the two after it.
     """
-    most, pair = own.shape[1], 0
+    most, pair = spline_values.shape[1], 0
     weights = np.empty((_TOGETHER * (_TOGETHER + 1) // 2, (1 + 2 * LATER) * most))
     for i in range(_TOGETHER):
         for j in range(i, _TOGETHER):
             for k in range(most):
-                weights[pair, k] = own[0, k, i] * own[0, k, j]
+                weights[pair, k] = spline_values[0, k, i] * spline_values[0, k, j]
                 for later in range(1, LATER + 1):
-                    weights[pair, (2 * later - 1) * most + k] = own[0, k, i] * own[later, k, j]
-                    weights[pair, 2 * later * most + k] = own[later, k, i] * own[0, k, j]
+                    weights[pair, (2 * later - 1) * most + k] = spline_values[0, k, i] * spline_values[later, k, j]
+                    weights[pair, 2 * later * most + k] = spline_values[later, k, i] * spline_values[0, k, j]
             pair += 1
     return weights
 

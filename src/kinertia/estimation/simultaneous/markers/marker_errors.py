@@ -75,14 +75,14 @@ class ErrorProcess(NamedTuple):
     @property
     def new(self) -> float:
         """Innovation variance of a process of unit variance: what the two frames before do not predict."""
-        one, two = self.of_before
-        return (1.0 + two) * ((1.0 - two) ** 2 - one**2) / (1.0 - two)
+        lag1, two = self.of_before
+        return (1.0 + two) * ((1.0 - two) ** 2 - lag1**2) / (1.0 - two)
 
     @property
     def frames(self) -> float:
         """Number of neighbouring frames over which its errors are correlated."""
-        one, two = self.of_before
-        return self.new / (1.0 - one - two) ** 2
+        lag1, two = self.of_before
+        return self.new / (1.0 - lag1 - two) ** 2
 
     @classmethod
     def read(cls, frames: float, products: np.ndarray) -> tuple[Self, float]:
@@ -102,7 +102,7 @@ class ErrorProcess(NamedTuple):
         short = [cls.with_smaller(0.0, float(f)) for f in np.geomspace(max(frames, 1.0), 1.0, _STEPS)[1:]]
         for process in (double, *slow, *short):
             variance = frames / process.frames
-            beyond = np.array([1.0, *(-each for each in process.of_before)])
+            beyond = np.array([1.0, *(-coefficient for coefficient in process.of_before)])
             if np.max(beyond @ products @ beyond) <= variance * process.new:
                 break
         return process, max(variance, 1.0)
@@ -125,27 +125,27 @@ class ErrorInformation:
     @classmethod
     def of(cls, seen: np.ndarray, sd_m: np.ndarray, process: ErrorProcess) -> Self:
         """Compute the information for markers seen (n, m), with standard deviations sd_m (m,)."""
-        one, two = process.of_before
+        lag1, two = process.of_before
         n, m = seen.shape
-        own, after, second = np.zeros((n, m)), np.zeros((max(n - 1, 0), m)), np.zeros((max(n - 2, 0), m))
+        diagonal, after, second = np.zeros((n, m)), np.zeros((max(n - 1, 0), m)), np.zeros((max(n - 2, 0), m))
         three = (seen[2:] & seen[1:-1] & seen[:-2]) / process.new
         # correlation of neighbours
-        alike = one / (1.0 - two)
-        own[2:] += three
-        own[1:-1] += one * one * three
-        own[:-2] += two * two * three
-        after[1:] -= one * three
-        after[:-1] += one * two * three
+        alike = lag1 / (1.0 - two)
+        diagonal[2:] += three
+        diagonal[1:-1] += lag1 * lag1 * three
+        diagonal[:-2] += two * two * three
+        after[1:] -= lag1 * three
+        after[:-1] += lag1 * two * three
         second -= two * three
         before = np.vstack([np.zeros((1, m), dtype=bool), seen[:-1]])
         # the first two frames after a gap
         pair = (seen[1:] & seen[:-1] & ~before[:-1]) / (1.0 - alike * alike)
-        own[:-1] += pair
-        own[1:] += pair
+        diagonal[:-1] += pair
+        diagonal[1:] += pair
         after -= alike * pair
-        own += seen & ~before & ~np.vstack([seen[1:], np.zeros((1, m), dtype=bool)])
+        diagonal += seen & ~before & ~np.vstack([seen[1:], np.zeros((1, m), dtype=bool)])
         weight = 1.0 / np.square(sd_m)
-        return cls(own * weight, after * weight, second * weight)
+        return cls(diagonal * weight, after * weight, second * weight)
 
 
 class SeenMarkers(NamedTuple):
@@ -263,7 +263,7 @@ def add_gradient(
     markers: SeenMarkers,
     first: Int1,
     values: Float2,
-    own: tuple[int, int],
+    rows: tuple[int, int],
     still: int,
     rhs: Float2,
     static_rhs: Float1,
@@ -273,7 +273,7 @@ def add_gradient(
     Arguments are as in `marker_terms`.
     """
     n, m = markers.same.shape
-    start, stop = own
+    start, stop = rows
     c, a = rhs.shape[1], len(markers.column)
     placed = PlacedMarkers(np.empty((5, a, 6)), np.empty((5, m, 3)), np.empty((5, m, 3)), np.empty((5, m, 3, 3)))
     pull, forces, cost = np.empty((m, 3)), np.empty((a, 6)), 0.0

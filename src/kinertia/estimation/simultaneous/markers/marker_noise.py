@@ -97,13 +97,13 @@ def repeats(errors: Sequence[np.ndarray], rates_hz: Sequence[float]) -> np.ndarr
         rates_hz: per trial.
     """
     slowest = min(rates_hz)
-    alike = [_resampled(each, rate / slowest) for each, rate in zip(errors, rates_hz, strict=True)]
-    own = [Repetition.of(each) for each in alike]
-    counts = np.diag([each.strides for each in own])
-    for a, b in np.argwhere(~np.eye(len(own), dtype=bool)):
-        first, second = own[a].period, own[b].period
+    alike = [_resampled(trial_errors, rate / slowest) for trial_errors, rate in zip(errors, rates_hz, strict=True)]
+    repetitions = [Repetition.of(resampled) for resampled in alike]
+    counts = np.diag([repetition.strides for repetition in repetitions])
+    for a, b in np.argwhere(~np.eye(len(repetitions), dtype=bool)):
+        first, second = repetitions[a].period, repetitions[b].period
         other = alike[b] if first is None or second is None else _resampled(alike[b], second / first)
-        slow = float(np.sqrt(own[a].slow * own[b].slow))
+        slow = float(np.sqrt(repetitions[a].slow * repetitions[b].slow))
         counts[a, b] = _in_other(alike[a], other, first or second, slow)
     return counts
 
@@ -230,13 +230,15 @@ class WithoutSkin:
             skin: patterns of each trial.
             frames: per trial, number of frames over which its errors are correlated: so many count as one.
         """
-        rests, still = [each.copy() for each in varying], displaced.copy()
+        rests, still = [trial_errors.copy() for trial_errors in varying], displaced.copy()
         for m, (first, last) in enumerate(zip(skin[0].first, skin[0].last, strict=True)):
-            seen = [np.isfinite(each[:, m]).all(axis=1) for each in varying]
+            seen = [np.isfinite(trial_errors[:, m]).all(axis=1) for trial_errors in varying]
             if last == first or not any(map(np.any, seen)):
                 continue
-            here = [each.values[shown, first:last] for each, shown in zip(skin, seen, strict=True)]
-            middle = np.array([each.mean(axis=0) if len(each) else np.zeros(last - first) for each in here])
+            here = [patterns.values[shown, first:last] for patterns, shown in zip(skin, seen, strict=True)]
+            middle = np.array(
+                [shown_values.mean(axis=0) if len(shown_values) else np.zeros(last - first) for shown_values in here]
+            )
             x = np.concatenate([(part - mean) / np.sqrt(f) for part, mean, f in zip(here, middle, frames, strict=True)])
             y = np.concatenate([e[shown, m] / np.sqrt(f) for e, shown, f in zip(varying, seen, frames, strict=True)])
             weight = np.concatenate([np.full(shown.sum(), f) for shown, f in zip(seen, frames, strict=True)])[:, None]
@@ -322,8 +324,8 @@ def _products(skeleton: Skeleton, errors: np.ndarray, sd_m: np.ndarray) -> np.nd
         shown = np.isfinite(three).all(axis=(0, 3))
         three[:, ~shown] = 0.0
         common = np.einsum("sm,tnmk->tnsk", of_segments, three, optimize=True)
-        kinds = [each.reshape(3, -1) for each in (three, common)]
-        result += [each @ each.T for each in kinds]
+        kinds = [triple.reshape(3, -1) for triple in (three, common)]
+        result += [kind @ kind.T for kind in kinds]
         count += 3 * int(np.count_nonzero(shown))
     return result / max(count, 1)
 
@@ -336,8 +338,8 @@ def _of_segments(skeleton: Skeleton) -> np.ndarray:
 
 def weighed(errors: np.ndarray, sd_m: np.ndarray | float) -> np.ndarray:
     """Return errors (n, 3 m) over their standard deviations, as in the estimate: no drifting marker may dominate."""
-    each = np.broadcast_to(sd_m, errors.shape[1])
-    result = errors / np.where(each > 0.0, each, 1.0)[:, None]
+    scale_m = np.broadcast_to(sd_m, errors.shape[1])
+    result = errors / np.where(scale_m > 0.0, scale_m, 1.0)[:, None]
     return np.nan_to_num(result, copy=False).reshape(len(errors), -1)
 
 
@@ -352,6 +354,6 @@ def markers_in_common(skeleton: Skeleton, errors: np.ndarray) -> np.ndarray:
         here = np.nan_to_num(errors[some])
         together += np.square(np.einsum("sm,nmk->nsk", of_segments, here, optimize=True)).sum(axis=(0, 2))
         apart += of_segments @ np.square(here).sum(axis=(0, 2))
-    each = np.where(apart > 0.0, np.maximum(1.0, together / np.where(apart > 0.0, apart, 1.0)), 1.0)
-    result: np.ndarray = each @ of_segments
+    ratio = np.where(apart > 0.0, np.maximum(1.0, together / np.where(apart > 0.0, apart, 1.0)), 1.0)
+    result: np.ndarray = ratio @ of_segments
     return result

@@ -91,8 +91,8 @@ class SkinPatterns:
         result = np.zeros((len(self.values), len(self.first), 3))
         for markers, places in self._by_segment:
             patterns = self.values[:, self.first[markers[0]] : self.last[markers[0]]]
-            each = coefficients[places].transpose(1, 0, 2).reshape(patterns.shape[1], -1)
-            result[:, markers] = (patterns @ each).reshape(-1, len(markers), 3)
+            by_pattern = coefficients[places].transpose(1, 0, 2).reshape(patterns.shape[1], -1)
+            result[:, markers] = (patterns @ by_pattern).reshape(-1, len(markers), 3)
         return result
 
     def information(self) -> np.ndarray:
@@ -100,9 +100,9 @@ class SkinPatterns:
         result = np.zeros((self.size, self.size))
         for markers, places in self._by_segment:
             count = len(markers)
-            own = np.eye(count) - ALIKE / (1.0 - ALIKE + ALIKE * count)
+            unshared = np.eye(count) - ALIKE / (1.0 - ALIKE + ALIKE * count)
             flat = places.reshape(count, -1)
-            result[flat[:, None], flat[None]] = own[:, :, None] / (1.0 - ALIKE)
+            result[flat[:, None], flat[None]] = unshared[:, :, None] / (1.0 - ALIKE)
         return result
 
     @cached_property
@@ -128,18 +128,18 @@ def skin_patterns(
             trials. None: all.
     """
     every = np.concatenate(trials)
-    own = [q for q, counts in zip(trials, adapted or [True] * len(trials), strict=True) if counts]
-    rest = np.concatenate(own) if own else every
+    adapted_q = [q for q, counts in zip(trials, adapted or [True] * len(trials), strict=True) if counts]
+    rest = np.concatenate(adapted_q) if adapted_q else every
     away, varying = every - rest.mean(axis=0), np.std(every, axis=0)
     turns, first, last = [np.zeros((every.shape[1], 0))], {}, {}
     for segment in np.unique(skeleton.marker_segments):
         directions = _directions(skeleton, skeleton.segments[segment], away, varying)
-        first[segment] = sum(each.shape[1] for each in turns)
+        first[segment] = sum(turn.shape[1] for turn in turns)
         last[segment] = first[segment] + directions.shape[1]
         turns.append(directions)
-    patterns = np.split(away @ np.hstack(turns), np.cumsum([len(each) for each in trials])[:-1])
+    patterns = np.split(away @ np.hstack(turns), np.cumsum([len(trial) for trial in trials])[:-1])
     begin, end = (np.array([part[s] for s in skeleton.marker_segments], dtype=int) for part in (first, last))
-    return tuple(SkinPatterns(each, begin, end) for each in patterns)
+    return tuple(SkinPatterns(pattern, begin, end) for pattern in patterns)
 
 
 def _directions(skeleton: Skeleton, segment: str, away: np.ndarray, varying: np.ndarray) -> np.ndarray:
@@ -175,8 +175,8 @@ def girdle_variance(skeleton: Skeleton, q: np.ndarray, shown: np.ndarray) -> np.
         if (segment_of(joint.child) or "").startswith("upper_arm") and _on_rigid_trunk(skeleton, joint):
             moved_m = CLAVICLE_M * CLAVICLE_PER_ARM * _spread_rad(skeleton, joint, q)
             carried = _from(skeleton, joint.child)
-            own = shown & np.array([marker.segment in carried for marker in skeleton.markers], dtype=bool)
-            result[own] = own.sum() * moved_m**2 / 3.0
+            on_segment = shown & np.array([marker.segment in carried for marker in skeleton.markers], dtype=bool)
+            result[on_segment] = on_segment.sum() * moved_m**2 / 3.0
     return result
 
 

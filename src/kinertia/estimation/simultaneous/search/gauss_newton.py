@@ -61,8 +61,8 @@ class GaussNewton:
         places, information = problem.layout.displaced, here.information.copy()
         trials = zip(here.trials, problem.displaced_sd, strict=True)
         displaced = tuple(Displaced.of(trial.information, places, sd) for trial, sd in trials)
-        for each in displaced:
-            information += each.information
+        for eliminated in displaced:
+            information += eliminated.information
         information[np.diag_indices_from(information)] += damping
         rest = StaticInformation.of(information, problem.layout.in_root.stop)
         return cls(problem, here, displaced, rest, rest)
@@ -80,17 +80,17 @@ class GaussNewton:
         places, sds = self.problem.layout.displaced, self.problem.displaced_sd
         for k, (trial, displaced) in enumerate(zip(self.here.trials, self.displaced, strict=True)):
             forward, lost = trial.forward(pull.coefficients[k])
-            own = pull.displaced[k] - sds[k] * lost[places]
-            static -= lost + own @ displaced.gain
+            offset_pull = pull.displaced[k] - sds[k] * lost[places]
+            static -= lost + offset_pull @ displaced.gain
             solved.append(forward)
-            rests.append(displaced.rest(own))
+            rests.append(displaced.rest(offset_pull))
         step, motions, moved = self.static.solution(static), [], []
         for k, (trial, displaced) in enumerate(zip(self.here.trials, self.displaced, strict=True)):
-            own = rests[k] - displaced.gain @ step
+            offset_pull = rests[k] - displaced.gain @ step
             in_trial = step.copy()
-            in_trial[places] += sds[k] * own
+            in_trial[places] += sds[k] * offset_pull
             motions.append(trial.motion_step(solved[k], in_trial))
-            moved.append(own)
+            moved.append(offset_pull)
         return np.concatenate([*(motion.ravel() for motion in motions), step, *moved])
 
     def in_trial(self, k: int, steps: np.ndarray) -> np.ndarray:
@@ -126,7 +126,7 @@ class MotionAlone:
         """Solve for the step of the motions alone; the steps of all other unknowns are zero."""
         pull = self.here.point.like(rhs)
         trials = zip(self.here.trials, pull.coefficients, strict=True)
-        motions = [trial.motion_step(trial.forward(own)[0], np.zeros(0)).ravel() for trial, own in trials]
+        motions = [trial.motion_step(trial.forward(trial_pull)[0], np.zeros(0)).ravel() for trial, trial_pull in trials]
         return np.concatenate([*motions, np.zeros(len(rhs) - sum(motion.size for motion in motions))])
 
 

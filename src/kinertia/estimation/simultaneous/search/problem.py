@@ -75,11 +75,13 @@ class Point:
     @property
     def vector(self) -> np.ndarray:
         """All unknowns in one vector."""
-        return np.concatenate([*(each.ravel() for each in self.coefficients), self.static, *self.displaced])
+        return np.concatenate(
+            [*(coefficient.ravel() for coefficient in self.coefficients), self.static, *self.displaced]
+        )
 
     def like(self, vector: np.ndarray) -> "Point":
         """Return the point whose `vector` this is."""
-        ends = np.cumsum([each.size for each in (*self.coefficients, self.static, *self.displaced)])
+        ends = np.cumsum([part.size for part in (*self.coefficients, self.static, *self.displaced)])
         parts = np.split(vector, ends[:-1])
         motions = zip(parts, self.coefficients, strict=False)
         count = len(self.coefficients)
@@ -159,7 +161,7 @@ class MapProblem:
         self.given = Given(skeleton, prior, calibration, trials, phase)
         self.bases, self.start, self.moving = self.given.bases, self.given.start, self.given.moving
         kinds = in_order(terms)
-        self.layout = Layout.of(one for term in kinds for one in term.unknowns(self.given))
+        self.layout = Layout.of(unknown for term in kinds for unknown in term.unknowns(self.given))
         self.model = FreedModel(self.given, self.layout)
         self.terms = tuple(term(self.model) for term in kinds)
         self.loads = GroundLoads(self.given, self.terms)
@@ -186,7 +188,7 @@ class MapProblem:
     @property
     def displaced_sd(self) -> tuple[np.ndarray, ...]:
         """Prior standard deviations of the unknowns that have an offset in each trial, per trial."""
-        (result,) = (one.displaced_sd for one in self.layout.unknowns if one.displaced_sd)
+        (result,) = (unknown.displaced_sd for unknown in self.layout.unknowns if unknown.displaced_sd)
         return result
 
     def shortened(self, point: Point, step: np.ndarray) -> np.ndarray:
@@ -227,7 +229,7 @@ class MapProblem:
 
     def left_out(self, static: np.ndarray) -> np.ndarray:
         """Return the displacements (S, u) of the unknowns by unknowns of unit SD that are left out of the vector."""
-        every = [each for term in self.terms if (each := term.left_out(static)) is not None]
+        every = [outside for term in self.terms if (outside := term.left_out(static)) is not None]
         return np.column_stack(every) if every else np.zeros((self.layout.size, 0))
 
     def profiled(self) -> list[int]:
@@ -257,11 +259,11 @@ class MapProblem:
         """Add the priors to the trials' gradients."""
         rhs, cost = self.prior_slope(point.static)
         rows, motions, displaced = zip(gradients, self.displaced_sd, point.displaced, strict=True), [], []
-        for gradient, sd, own in rows:
+        for gradient, sd, scaled in rows:
             rhs = rhs + gradient.static_rhs
-            cost += gradient.cost + 0.5 * float(own @ own)
+            cost += gradient.cost + 0.5 * float(scaled @ scaled)
             motions.append(gradient.rhs)
-            displaced.append(sd * gradient.static_rhs[self.layout.displaced] - own)
+            displaced.append(sd * gradient.static_rhs[self.layout.displaced] - scaled)
         before, places = sum(motion.size for motion in motions), self.layout.errors
         errors = slice(before + places.start, before + places.stop)
         return Slope(point, cost, Point(tuple(motions), rhs, tuple(displaced)).vector, errors)
@@ -281,8 +283,8 @@ class MapProblem:
         bordered: bool = True,
     ) -> Eliminated:
         """Return trial k with its motion eliminated; not `bordered`: for the motion alone, with all else fixed."""
-        of = partial(self.normal, k, coefficients, static, bordered=bordered)
-        return Eliminated.of(self.time_blocks[k], of, self._pool.back, damping, self.precise)
+        equations_of = partial(self.normal, k, coefficients, static, bordered=bordered)
+        return Eliminated.of(self.time_blocks[k], equations_of, self._pool.back, damping, self.precise)
 
     def normal(
         self,
@@ -306,11 +308,11 @@ class MapProblem:
         def of_part(part: tuple[Sequence[TimeBlock], Sequence[CostTerm]]) -> Gradient:
             result = Gradient.zero(len(coefficients), len(self.moving), self.layout.size)
             for time_block in part[0]:
-                own = Gradient.zero(time_block.size, len(self.moving), self.layout.size)
+                gradient = Gradient.zero(time_block.size, len(self.moving), self.layout.size)
                 here = self._here(k, coefficients, static, time_block)
                 for term in part[1]:
-                    term.add(own, here)
-                result.add(own, time_block.touched)
+                    term.add(gradient, here)
+                result.add(gradient, time_block.touched)
             return result
 
         longer = [joined(half) for half in halves(self.time_blocks[k]) if half]

@@ -208,7 +208,7 @@ class GroundLoads:
             by = term.by_unknowns(k, static, loads, loaded, plate_index)
             for later in self._terms[place + 1 :]:
                 columns = np.moveaxis(by.reshape(*loads.shape, -1), -1, 0)
-                rhs = [later.corrected_loads(k, static, one, nothing, plate_index) for one in columns]
+                rhs = [later.corrected_loads(k, static, column, nothing, plate_index) for column in columns]
                 by = np.stack(rhs, axis=-1).reshape(by.shape)
             yield by, partial(term.add_by_unknowns, k)
 

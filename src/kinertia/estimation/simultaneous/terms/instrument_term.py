@@ -84,10 +84,10 @@ class InstrumentErrors(LoadTerm):
 
     def add_pull(self, rhs: np.ndarray, static: np.ndarray) -> float:
         """Add the right-hand side from other people of the session, and return the change in twice the cost."""
-        own, shown = static[self.layout.laboratory], self._session
-        pull = shown.information @ own
+        errors, shown = static[self.layout.laboratory], self._session
+        pull = shown.information @ errors
         rhs[self.layout.laboratory] += shown.rhs - pull
-        return float(own @ (pull - 2.0 * shown.rhs))
+        return float(errors @ (pull - 2.0 * shown.rhs))
 
     def left_out(self, static: np.ndarray) -> np.ndarray:
         """Return the zero offsets that a tilt about each horizontal axis imitates (`mean_loads_n`)."""
@@ -105,8 +105,8 @@ class InstrumentErrors(LoadTerm):
     def profiled(self) -> list[int]:
         """Return the delays of a single trial with forces, if it is undetermined whether they are delayed."""
         places, priors = self.delay_unknowns(0), self.layout.error_priors.individual
-        own = [priors[at - self.layout.errors.start] for at in places]
-        uncertain = any(0.0 < prior.fault_probability < 1.0 for prior in own)
+        mixtures = [priors[at - self.layout.errors.start] for at in places]
+        uncertain = any(0.0 < prior.fault_probability < 1.0 for prior in mixtures)
         return places if uncertain and sum(map(bool, self._own)) < 2 else []
 
     def corrected_loads(
@@ -146,17 +146,17 @@ class InstrumentErrors(LoadTerm):
         """Return the indices (q,) of the trial-specific gains of the q plates of trial k."""
         return self._of_trial(k, GAINS, 1)
 
-    def _of_trial(self, k: int, name: str, each: int) -> np.ndarray:
-        first = self.layout[name].start + each * sum(map(len, self._own[:k]))
-        return np.arange(first, first + each * len(self._own[k]))
+    def _of_trial(self, k: int, name: str, per_trial: int) -> np.ndarray:
+        first = self.layout[name].start + per_trial * sum(map(len, self._own[:k]))
+        return np.arange(first, first + per_trial * len(self._own[k]))
 
     def read(self, solution: Solution) -> dict[str, Any]:
         """Return an entry of each error with standard deviation and support, and the information for the session."""
         trials, plates, values, sd = self.given.trials, self.given.plates, solution.static, solution.sd
-        own = solution.covariance[self.layout[PLATES], self.layout[PLATES]]
+        covariance = solution.covariance[self.layout[PLATES], self.layout[PLATES]]
         shape = len(plates), len(PLATE_ERRORS)
         shared = (self._to_plates @ values[self.layout[PLATES]]).reshape(shape)
-        shared_sd = np.sqrt(np.diag(self._to_plates @ own @ self._to_plates.T)).reshape(shape)
+        shared_sd = np.sqrt(np.diag(self._to_plates @ covariance @ self._to_plates.T)).reshape(shape)
         zeros = [(trial.ground.plates, self.zeros_of(k)) for k, trial in enumerate(trials)]
         found = FoundErrors(
             plates=dict(zip(plates, zip(shared, shared_sd, strict=True), strict=True)),
@@ -178,9 +178,9 @@ class InstrumentErrors(LoadTerm):
 
     def _delays(self, solution: Solution) -> tuple[tuple[float, float], ...]:
         """Return the additional delays of several trials, or a single trial's total, with standard deviations, s."""
-        own = solution.pairs(self.layout[TRIAL_DELAYS])
-        if len(own) != 1:
-            return tuple(own)
+        delays = solution.pairs(self.layout[TRIAL_DELAYS])
+        if len(delays) != 1:
+            return tuple(delays)
         both = self.delay_unknowns(0)
         return ((float(solution.static[both].sum()), float(np.sqrt(solution.covariance[np.ix_(both, both)].sum()))),)
 
@@ -207,11 +207,14 @@ class InstrumentErrors(LoadTerm):
         more = (0, len(mean) - size)
         before = ((prior.precision, prior.pull), (np.pad(session.information, more), np.pad(session.rhs, more)))
         shown = InstrumentInformation.of_posterior(self.given.plates, mean, covariance, before)
-        own = priors.individual[size:]
+        individual = priors.individual[size:]
         if len(self.given.trials) > 1:
             faulty = fault_probabilities(priors, shown.information, shown.rhs)[size:].tolist()
-            own = tuple(replace(one, fault_probability=share) for one, share in zip(own, faulty, strict=True))
-        return shown.without_own(np.array([one.sd for one in own]))
+            individual = tuple(
+                replace(prior_of_error, fault_probability=share)
+                for prior_of_error, share in zip(individual, faulty, strict=True)
+            )
+        return shown.without_own(np.array([prior_of_error.sd for prior_of_error in individual]))
 
 
 def mean_loads_n(trial: Observation) -> np.ndarray:
@@ -288,12 +291,12 @@ class MissingLoads(CostTerm):
 
     def in_root(self, root: RootFrames, k: int, static: np.ndarray) -> RootFrames:
         """Add the missing loads of trial k."""
-        own = [index for index, part in enumerate(self.parts) if part.trial == k]
-        if not own:
+        parts = [index for index, part in enumerate(self.parts) if part.trial == k]
+        if not parts:
             return root
         loads = self.given.grounds[k].loads(self.given.trials[k].time[root.frames]).reshape(-1, 2, 6)
-        by = np.stack([self.parts[index].of(loads, root.frames) for index in own], axis=2)
-        at = self.layout[MISSING].start + np.array(own)
+        by = np.stack([self.parts[index].of(loads, root.frames) for index in parts], axis=2)
+        at = self.layout[MISSING].start + np.array(parts)
 
         def add(by_static: np.ndarray, by: np.ndarray) -> None:
             by_static[:, :, at] += by

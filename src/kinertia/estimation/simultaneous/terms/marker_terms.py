@@ -76,14 +76,14 @@ def add_markers(
         still: number of coordinates that do not move.
     """
     near = time_block.with_neighbours
-    own = (time_block.frames.start - near.start, time_block.frames.stop - near.start)
+    rows = (time_block.frames.start - near.start, time_block.frames.stop - near.start)
     first, values = basis.first[near] - time_block.splines.start, basis.values[0][near]
     if not isinstance(into, NormalEquations):
-        into.cost += 0.5 * add_gradient(markers, first, values, own, still, into.rhs, into.static_rhs[columns])
+        into.cost += 0.5 * add_gradient(markers, first, values, rows, still, into.rhs, into.static_rhs[columns])
         return
     static = _Static(into.static[columns, columns], into.static_rhs[columns], np.zeros(1))
     border = into.border[..., columns] if into.bordered else NO_BORDER
-    _add(markers, first, values, own, still, into.band, border, into.rhs, static, into.bordered)
+    _add(markers, first, values, rows, still, into.band, border, into.rhs, static, into.bordered)
     into.cost += 0.5 * float(static.cost[0])
 
 
@@ -92,7 +92,7 @@ def _add(
     markers: SeenMarkers,
     first: Int1,
     values: Float2,
-    own: tuple[int, int],
+    rows: tuple[int, int],
     still: int,
     band: Float4,
     border: StridedFloat3,
@@ -105,7 +105,7 @@ def _add(
     `first` and `values` are those of the motion basis.
     """
     n, m = markers.same.shape
-    start, stop = own
+    start, stop = rows
     c, a, s = band.shape[2], len(markers.column), len(static.rhs)
     reach, pairs = _reach(markers, c, still), _pairs(markers.tree.parent)
     placed = PlacedMarkers(np.empty((5, a, 6)), np.empty((5, m, 3)), np.empty((5, m, 3)), np.empty((5, m, 3, 3)))
@@ -231,7 +231,7 @@ def _by_place(
     axes, at, turned = placed.axes[here], placed.places[here], placed.turned[here]
     across, square, rhs = interval.across[row], static.square, static.rhs
     most = directions.shape[2]
-    own, values, velocity = np.empty((3, most)), np.empty(most), np.empty(3)
+    local, values, velocity = np.empty((3, most)), np.empty(most), np.empty(3)
     for m in range(len(markers.last_axis)):
         d, place, first = directions[m], still + 3 * m, markers.first[m]
         # number of columns before those of the skin
@@ -240,15 +240,15 @@ def _by_place(
         for i in range(3):
             along = turned[m, 0, i] * pull[m, 0] + turned[m, 1, i] * pull[m, 1] + turned[m, 2, i] * pull[m, 2]
             for j in range(count):
-                own[i, j] = turned[m, 0, i] * d[0, j] + turned[m, 1, i] * d[1, j] + turned[m, 2, i] * d[2, j]
+                local[i, j] = turned[m, 0, i] * d[0, j] + turned[m, 1, i] * d[1, j] + turned[m, 2, i] * d[2, j]
             for g in range(count // 3):
                 pattern = 1.0 if g == 0 else markers.patterns[k, first + g - 1]
-                one = i + (place if g == 0 else skin + 3 * g)
-                rhs[one] += pattern * along
+                unknown = i + (place if g == 0 else skin + 3 * g)
+                rhs[unknown] += pattern * along
                 for j in range(3):
-                    square[one, place + j] += pattern * own[i, j]
+                    square[unknown, place + j] += pattern * local[i, j]
                 for j in range(3, count):
-                    square[one, skin + j] += pattern * own[i, j]
+                    square[unknown, skin + j] += pattern * local[i, j]
         j = markers.last_axis[m]
         while j >= 0:
             velocity[0] = axes[j, 0] + axes[j, 4] * at[m, 2] - axes[j, 5] * at[m, 1]
@@ -263,9 +263,9 @@ def _by_place(
                     across[column[j], skin + i] += values[i]
             else:
                 for i in range(count):
-                    one = i + (place if i < 3 else skin)
-                    square[column[j] - c, one] += values[i]
-                    square[one, column[j] - c] += values[i]
+                    unknown = i + (place if i < 3 else skin)
+                    square[column[j] - c, unknown] += values[i]
+                    square[unknown, column[j] - c] += values[i]
             j = parent[j]
 
 

@@ -64,7 +64,7 @@ class MarkerPositions(CostTerm):
 
     def read(self, solution: Solution) -> dict[str, Any]:
         """Return the displacements of the markers of each trial from their positions."""
-        return {"marker_offsets_m": tuple(own.reshape(-1, 3) for own in solution.displaced)}
+        return {"marker_offsets_m": tuple(offsets.reshape(-1, 3) for offsets in solution.displaced)}
 
 
 class StaticCoordinates(CostTerm):
@@ -125,10 +125,10 @@ class Skin(CostTerm):
 
     def add_pull(self, rhs: np.ndarray, static: np.ndarray) -> float:
         """Add the right-hand side of the coefficients' prior, and return its sum of squares."""
-        own = static[self.layout[SKIN]]
-        pull = self._information @ own
+        coefficients = static[self.layout[SKIN]]
+        pull = self._information @ coefficients
         rhs[self.layout[SKIN]] -= pull
-        return float(own @ pull)
+        return float(coefficients @ pull)
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,14 +270,14 @@ def hips_bent_rad(skeleton: Skeleton, q: np.ndarray) -> float:
 
     It is 0 if the model has no thigh or no pelvis.
     """
-    of = [segment_of(name) or "" for name in skeleton.segments]
-    thighs = [k for k, each in enumerate(of) if each.startswith("thigh")]
-    if not thighs or "pelvis" not in of:
+    of_segment = [segment_of(name) or "" for name in skeleton.segments]
+    thighs = [k for k, name in enumerate(of_segment) if name.startswith("thigh")]
+    if not thighs or "pelvis" not in of_segment:
         return 0.0
     rotation = skeleton.pose(np.concatenate([np.zeros((1, q.shape[1])), q])).rotation
-    pelvis = rotation[:, of.index("pelvis")].transpose(0, 2, 1)
+    pelvis = rotation[:, of_segment.index("pelvis")].transpose(0, 2, 1)
     turned = [pelvis @ rotation[:, k] for k in thighs]
-    cosine = [0.5 * (np.einsum("ij,nij->n", each[0], each[1:]) - 1.0) for each in turned]
+    cosine = [0.5 * (np.einsum("ij,nij->n", rotations[0], rotations[1:]) - 1.0) for rotations in turned]
     return float(np.percentile(np.arccos(np.clip(cosine, -1.0, 1.0)), _MOST_OF_TIME))
 
 
@@ -287,8 +287,8 @@ def task_direction(segments: Sequence[str], mass_kg: np.ndarray, sd: float) -> n
     The first unknown of each segment is the logarithm of its mass (s,). The pelvis gains what the thighs lose, `sd` of
     their mass.
     """
-    of = [segment_of(name) or "" for name in segments]
-    thighs, pelvis = (np.array([each.startswith(wanted) for each in of]) for wanted in ("thigh", "pelvis"))
+    of_segment = [segment_of(name) or "" for name in segments]
+    thighs, pelvis = (np.array([name.startswith(wanted) for name in of_segment]) for wanted in ("thigh", "pelvis"))
     gained = np.where(thighs, sd * mass_kg, 0.0)
     if pelvis.any():
         gained -= np.where(pelvis, gained.sum() * mass_kg / mass_kg[pelvis].sum(), 0.0)

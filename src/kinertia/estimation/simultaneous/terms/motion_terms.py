@@ -149,19 +149,19 @@ def add_start(into: Gradient, time_block: TimeBlock, moved: np.ndarray) -> None:
         time_block: of the trial.
         moved: (splines, c) distance of all coefficients of the trial from their start.
     """
-    own, following = moved[time_block.splines], moved[time_block.splines.start + 1 : time_block.splines.stop + 1]
-    count, pairs = len(own), min(len(following), time_block.size - 1)
-    change = following[:pairs] - own[:pairs]
-    into.rhs[:count] -= own / AWAY_SD**2
+    inside, following = moved[time_block.splines], moved[time_block.splines.start + 1 : time_block.splines.stop + 1]
+    count, pairs = len(inside), min(len(following), time_block.size - 1)
+    change = following[:pairs] - inside[:pairs]
+    into.rhs[:count] -= inside / AWAY_SD**2
     into.rhs[:pairs] += change / CHANGE_SD**2
     into.rhs[1 : pairs + 1] -= change / CHANGE_SD**2
-    into.cost += 0.5 * float(np.square(own / AWAY_SD).sum() + np.square(change / CHANGE_SD).sum())
+    into.cost += 0.5 * float(np.square(inside / AWAY_SD).sum() + np.square(change / CHANGE_SD).sum())
     if isinstance(into, NormalEquations):
-        each = np.arange(moved.shape[1])
-        into.band[:count, 0, each, each] += 1.0 / AWAY_SD**2
-        into.band[:pairs, 0, each, each] += 1.0 / CHANGE_SD**2
-        into.band[1 : pairs + 1, 0, each, each] += 1.0 / CHANGE_SD**2
-        into.band[:pairs, 1, each, each] -= 1.0 / CHANGE_SD**2
+        coordinates = np.arange(moved.shape[1])
+        into.band[:count, 0, coordinates, coordinates] += 1.0 / AWAY_SD**2
+        into.band[:pairs, 0, coordinates, coordinates] += 1.0 / CHANGE_SD**2
+        into.band[1 : pairs + 1, 0, coordinates, coordinates] += 1.0 / CHANGE_SD**2
+        into.band[:pairs, 1, coordinates, coordinates] -= 1.0 / CHANGE_SD**2
 
 
 class RootLoads(CostTerm):

@@ -176,20 +176,20 @@ def _columns_by_bodies(
     static: np.ndarray,
 ) -> None:
     """Write derivatives by the bodies' unknowns to the first columns of `static` (6, s)."""
-    w, e, b, own, by = np.empty(3), np.empty(3), np.empty(3), np.empty((6, 10)), np.empty((6, 10))
+    w, e, b, by_body, by = np.empty(3), np.empty(3), np.empty(3), np.empty((6, 10)), np.empty((6, 10))
     for body in range(len(segments)):
         s = segments[body]
         last_axis, turn = tree.last_axis[s], rotation[s]
         if last_axis < 0:
             continue
         in_segment(frame.velocity[last_axis], frame.acceleration[last_axis], turn, translation[s], w, e, b)
-        own_regressor(w, e, b, own)
+        own_regressor(w, e, b, by_body)
         by[:] = 0.0
         for r in range(6):
             # forces do not depend on moments of inertia, nor moments on the mass
             for k in range(0, 4) if r < 3 else range(1, 10):
                 for c in range(10):
-                    by[r, c] += own[r, k] * chain[body, k, c]
+                    by[r, c] += by_body[r, k] * chain[body, k, c]
         x, y, z = translation[s, 0] - about[0], translation[s, 1] - about[1], translation[s, 2] - about[2]
         for c in range(10):
             k = 10 * body + c

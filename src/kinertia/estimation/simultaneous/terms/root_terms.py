@@ -113,11 +113,11 @@ class RootFrames:
             by_static[:, :, places] += self.by_single[:, :, quantity : quantity + 1]
         chain = dynamic_jacobian(self.theta)
         left, (q, qd, qdd) = root_columns(*self._moving, self.wrench, chain, self.sd, columns, by_static)
-        for one in self.of_segments:
-            own = slice(10 * one.row, 10 * one.row + 10)
+        for segment in self.of_segments:
+            rows = slice(10 * segment.row, 10 * segment.row + 10)
             # the step of the segment's unknowns that changes its parameters by the same amount
-            step = np.linalg.solve(dynamic_jacobian(self.theta[own])[0], one.parameters)
-            by_static[:, :, one.place] += by_static[:, :, own] @ step
+            step = np.linalg.solve(dynamic_jacobian(self.theta[rows])[0], segment.parameters)
+            by_static[:, :, segment.place] += by_static[:, :, rows] @ step
         return RootTerms(self.frames, q, qd, qdd, by_static, left)
 
     def add_gradient(self, into: Gradient, columns: Columns, basis: MotionBasis, start: int) -> None:
@@ -137,8 +137,8 @@ class RootFrames:
         for places, pull in zip(self.at, np.einsum("nr,nre->e", pulls, self.by_single), strict=True):
             by_static[:, :, places] += pull
         into.static_rhs[: self.static] += by_static[0, 0]
-        for one in self.of_segments:
-            into.static_rhs[one.place] -= by_bodies[one.row] @ one.parameters
+        for segment in self.of_segments:
+            into.static_rhs[segment.place] -= by_bodies[segment.row] @ segment.parameters
 
     @property
     def _moving(self) -> _Moving:
@@ -188,8 +188,8 @@ def add_root(into: NormalEquations, columns: slice, basis: MotionBasis, start: i
     values = np.ascontiguousarray(basis.values[:, root.frames])
     pulls = [(left[:, None] @ by)[:, 0] for by in (root.q, root.qd, root.qdd)]
     for i in range(6):
-        each = sum(value[:, i, None] * pull for value, pull in zip(values, pulls, strict=True))
-        into.rhs[intervals - start + i] -= np.add.reduceat(each, begins, axis=0)
+        pulled = sum(value[:, i, None] * pull for value, pull in zip(values, pulls, strict=True))
+        into.rhs[intervals - start + i] -= np.add.reduceat(pulled, begins, axis=0)
     if into.bordered:
         into.static[columns, columns] += flat.T @ flat
     rows = np.empty((len(left), 6, 6, c))
@@ -222,8 +222,8 @@ def _add_intervals(
     """
     c = band.shape[2]
     for k in range(len(first)):
-        own, at = rows[ends[k] : ends[k + 1]], first[k]
-        square = np.dot(own.T, own)
+        in_interval, at = rows[ends[k] : ends[k + 1]], first[k]
+        square = np.dot(in_interval.T, in_interval)
         for i in range(6):
             for row in range(c):
                 for j in range(i, 6):
@@ -231,7 +231,7 @@ def _add_intervals(
                         band[at + i, j - i, row, column] += square[i * c + row, j * c + column]
         if not bordered:
             continue
-        across = np.dot(own.T, static[ends[k] : ends[k + 1]])
+        across = np.dot(in_interval.T, static[ends[k] : ends[k + 1]])
         for i in range(6):
             for row in range(c):
                 for s in range(across.shape[1]):

@@ -61,12 +61,12 @@ class CurveDeviations:
     def curves(self) -> tuple[np.ndarray, ...]:
         """The standard deviations of all curves, in the order of the attributes."""
         every = (getattr(self, field.name) for field in fields(self))
-        return tuple(each for each in every if each is not None)
+        return tuple(curve for curve in every if curve is not None)
 
     def roots(self) -> CurveDeviations:
         """Convert variances to standard deviations, in place."""
-        for each in self.curves:
-            np.sqrt(np.maximum(each, 0.0, out=each), out=each)
+        for curve in self.curves:
+            np.sqrt(np.maximum(curve, 0.0, out=curve), out=curve)
         return self
 
     @classmethod
@@ -76,18 +76,18 @@ class CurveDeviations:
 
     def at(self, frames: slice | np.ndarray) -> CurveDeviations:
         """Return the standard deviations of these frames."""
-        return CurveDeviations(*(each[frames] for each in self.curves))
+        return CurveDeviations(*(curve[frames] for curve in self.curves))
 
     def of_motion_alone(self) -> CurveDeviations:
         """Return them without loads: errors of instruments that no root equation shows are not known to be small."""
-        unknown = [np.full(each.shape, np.nan) for each in self.curves[1:]]
+        unknown = [np.full(curve.shape, np.nan) for curve in self.curves[1:]]
         return CurveDeviations(self.coordinates, *unknown)
 
     def spread_over(self, rows: np.ndarray, count: int) -> CurveDeviations:
         """Return the standard deviations of `count` frames, of which these (d,) are known; NaN in the others."""
-        result = [np.full((count, *each.shape[1:]), np.nan) for each in self.curves]
-        for into, each in zip(result, self.curves, strict=True):
-            into[rows] = each
+        result = [np.full((count, *curve.shape[1:]), np.nan) for curve in self.curves]
+        for into, curve in zip(result, self.curves, strict=True):
+            into[rows] = curve
         return CurveDeviations(*result)
 
 
@@ -192,9 +192,9 @@ class _Curves:
         seen = _Seen(by, self.speed[rows], basis.first[chosen], values, self.shares, self.grown[rows, :c])
         _write_variances(spread, seen, known, variance, rows)
         joints = replace(seen, by=every.rows(slice(c, None)), grown=self.grown[rows, c:])
-        own = _joint_variances(spread, joints, known)
-        own += knee_geometry(moments.virtual.skeleton, moments.virtual.joints, joints.by.value)
-        self.of_joints[rows] = own.reshape(len(own), *self.of_joints.shape[1:])
+        variances = _joint_variances(spread, joints, known)
+        variances += knee_geometry(moments.virtual.skeleton, moments.virtual.joints, joints.by.value)
+        self.of_joints[rows] = variances.reshape(len(variances), *self.of_joints.shape[1:])
         ground = np.square(by.ground @ known[problem.layout.errors]).sum(axis=-1) + by.ground_delay_squares
         noise_n = moments.reactions.noise_n * (by.loads[..., :3] != 0.0)
         variance.ground_forces[rows] = ground.reshape(-1, 2, 3) + np.square(noise_n)
@@ -253,25 +253,25 @@ def _intervals(spread: MotionSpread, seen: _Seen, root: np.ndarray) -> Iterator[
     still = by.static.reshape(-1, n).astype(precision) @ root.astype(precision)
     starts = np.flatnonzero(np.diff(seen.first, prepend=-1))
     for start, stop in zip(starts, np.append(starts[1:], d), strict=True):
-        own = slice(start, stop)
+        frames = slice(start, stop)
         covariance, carried = spread.active(int(seen.first[start]))
-        values, orders = np.ascontiguousarray(seen.values[:, own]), (by.q[own], by.qd[own], by.qdd[own])
+        values, orders = np.ascontiguousarray(seen.values[:, frames]), (by.q[frames], by.qd[frames], by.qdd[frames])
         by_splines = np.empty((2, stop - start, r, 6, c), precision)
         write_by_splines(values, *orders, by_splines[0])
         write_by_splines(seen.shares[:, None, None] * values, *orders, by_splines[1])
         plain, shaken = by_splines.reshape(2, -1, 6 * c)
-        shaken *= seen.grown[own].reshape(-1, 1)
+        shaken *= seen.grown[frames].reshape(-1, 1)
         moment = plain @ carried.reshape(6 * c, -1)
         moment[:, :some] -= still[start * r : stop * r]
-        yield _Interval(own, moment, shaken, shaken @ covariance.astype(precision), covariance, carried, values)
+        yield _Interval(frames, moment, shaken, shaken @ covariance.astype(precision), covariance, carried, values)
 
 
 def _write_variances(spread: MotionSpread, seen: _Seen, root: np.ndarray, into: CurveDeviations, rows: slice) -> None:
     """Write the variances of coordinates, moments and powers into rows of `into`, as if the delay were known."""
     sums = np.empty((4, *seen.by.static.shape[:2]))
-    for one in _intervals(spread, seen, root):
-        errors = (one.shaken, one.by_errors, one.covariance, one.values, seen.shares)
-        write_variances(one.moment, one.carried, *errors, sums[:, one.frames])
+    for interval in _intervals(spread, seen, root):
+        errors = (interval.shaken, interval.by_errors, interval.covariance, interval.values, seen.shares)
+        write_variances(interval.moment, interval.carried, *errors, sums[:, interval.frames])
     place, rate, force, both = sums
     value = seen.by.value
     into.coordinates[rows], into.moments[rows] = place, force
@@ -281,8 +281,8 @@ def _write_variances(spread: MotionSpread, seen: _Seen, root: np.ndarray, into: 
 def _joint_variances(spread: MotionSpread, seen: _Seen, root: np.ndarray) -> np.ndarray:
     """Return the variances (d, r) of rows of joints, with that of the delay."""
     result = seen.by.delay_squares.copy()
-    for one in _intervals(spread, seen, root) if result.shape[1] else ():
-        variance = np.einsum("ij,ij->i", one.moment, one.moment)
-        variance += np.einsum("ij,ij->i", one.by_errors, one.shaken)
-        result[one.frames] += variance.reshape(-1, result.shape[1])
+    for interval in _intervals(spread, seen, root) if result.shape[1] else ():
+        variance = np.einsum("ij,ij->i", interval.moment, interval.moment)
+        variance += np.einsum("ij,ij->i", interval.by_errors, interval.shaken)
+        result[interval.frames] += variance.reshape(-1, result.shape[1])
     return result

@@ -128,8 +128,8 @@ def _recursion(band: BlockBand, rhs: np.ndarray, after: np.ndarray | None) -> tu
             below[i] = -diagonal[i + 1] @ reach
             diagonal[i] -= reach.T @ below[i]
             rows = np.concatenate([half, -reach])
-        own = rhs[i : i + len(rows) // k]
-        rhs[i] = rows.astype(rhs.dtype).T @ own.reshape(len(rows), -1)
+        block = rhs[i : i + len(rows) // k]
+        rhs[i] = rows.astype(rhs.dtype).T @ block.reshape(len(rows), -1)
     return diagonal, below
 
 
@@ -160,20 +160,34 @@ def write_variances(
     _, n, c = out.shape
     size = moment.shape[1]
     alone = np.empty((6, 6))
-    zero, one = moment.dtype.type(0.0), values.astype(moment.dtype)
+    zero, splines = moment.dtype.type(0.0), values.astype(moment.dtype)
     for j in range(c):
         u, v, w, x, y, z = carried[0, j], carried[1, j], carried[2, j], carried[3, j], carried[4, j], carried[5, j]
         for i in range(6):
             for s in range(6):
                 alone[i, s] = covariance[i * c + j, s * c + j]
         for k in range(n):
-            p0, p1, p2, p3, p4, p5 = one[0, k, 0], one[0, k, 1], one[0, k, 2], one[0, k, 3], one[0, k, 4], one[0, k, 5]
-            r0, r1, r2, r3, r4, r5 = one[1, k, 0], one[1, k, 1], one[1, k, 2], one[1, k, 3], one[1, k, 4], one[1, k, 5]
+            p0, p1, p2, p3, p4, p5 = (
+                splines[0, k, 0],
+                splines[0, k, 1],
+                splines[0, k, 2],
+                splines[0, k, 3],
+                splines[0, k, 4],
+                splines[0, k, 5],
+            )
+            r0, r1, r2, r3, r4, r5 = (
+                splines[1, k, 0],
+                splines[1, k, 1],
+                splines[1, k, 2],
+                splines[1, k, 3],
+                splines[1, k, 4],
+                splines[1, k, 5],
+            )
             place, rate, force, both, row = zero, zero, zero, zero, k * c + j
             for s in range(size):
-                own = p0 * u[s] + p1 * v[s] + p2 * w[s] + p3 * x[s] + p4 * y[s] + p5 * z[s]
+                shift = p0 * u[s] + p1 * v[s] + p2 * w[s] + p3 * x[s] + p4 * y[s] + p5 * z[s]
                 change = r0 * u[s] + r1 * v[s] + r2 * w[s] + r3 * x[s] + r4 * y[s] + r5 * z[s]
-                place += own * own
+                place += shift * shift
                 rate += change * change
                 force += moment[row, s] * moment[row, s]
                 both += moment[row, s] * change

@@ -97,14 +97,14 @@ class _Shown:
         """
         layout, given = self.problem.layout, self.problem.given
         instruments, parts = self.problem.term(InstrumentErrors), self.problem.term(MissingLoads).parts
-        own, first = list(layout.error_priors.individual), layout.errors.start
+        individual, first = list(layout.error_priors.individual), layout.errors.start
         for k, trial in enumerate(given.trials):
             for name, at in zip(trial.ground.plates, instruments.gains_of(k), strict=True):
                 if name in suspected:
-                    own[at - first] = FaultMixture.certain(_GAIN_SD)
+                    individual[at - first] = FaultMixture.certain(_GAIN_SD)
         for at, part in enumerate(parts, layout[MISSING].start - first):
-            own[at] = FaultMixture.certain(MISSING_SD if part.plate in incomplete else _USUAL_SD)
-        return ErrorPriors(tuple(own), layout.error_priors.common)
+            individual[at] = FaultMixture.certain(MISSING_SD if part.plate in incomplete else _USUAL_SD)
+        return ErrorPriors(tuple(individual), layout.error_priors.common)
 
     def log_evidence(self, priors: ErrorPriors) -> float:
         """Return the logarithm of the evidence under these priors, up to what all have in common."""
@@ -120,7 +120,7 @@ class _Shown:
         for part, sums in self._sums(plate):
             factor = 1.0 + float(sums @ mean)
             found.append((part, 1.0 - 1.0 / factor, float(np.sqrt(sums @ covariance @ sums)) / factor**2))
-        most = max(found, key=lambda one: one[1], default=None)
+        most = max(found, key=lambda missing: missing[1], default=None)
         return most if most is not None and most[1] > _LEAST else None
 
     def _sums(self, plate: int) -> list[tuple[LoadPart, np.ndarray]]:
@@ -136,15 +136,15 @@ class _Shown:
                 same = (whole.trial, whole.foot, whole.plate) == (part.trial, part.foot, part.plate)
                 if whole.vertical and same and (whole.frames & part.frames).any():
                     sums[start + other] = 1.0
-            own = self.problem.given.trials[part.trial].ground.plates.index(self.problem.given.plates[plate])
-            sums[instruments.gains_of(part.trial)[own] - first] = 1.0
+            column = self.problem.given.trials[part.trial].ground.plates.index(self.problem.given.plates[plate])
+            sums[instruments.gains_of(part.trial)[column] - first] = 1.0
             result.append((part, sums))
         return result
 
 
 def suspected_plates(errors: Sequence[CalibrationEntry]) -> list[str]:
     """Return the names of plates whose errors of gain or position were found: loads may be missing there."""
-    suspected = (one.plate for one in errors if one.quantity in (GAIN, POSITION) and one.found)
+    suspected = (error.plate for error in errors if error.quantity in (GAIN, POSITION) and error.found)
     return list(dict.fromkeys(name for name in suspected if name is not None))
 
 
@@ -227,7 +227,7 @@ def instrument_support(
     root, late = model.static.root_of_covariance(), model.problem.loads.delay_unknowns
     delay_sd_s = [float(np.linalg.norm(root[late(k)].sum(axis=0))) for k in range(len(curves))]
     each_trial = enumerate(zip(curves, delay_sd_s, strict=True))
-    moved = [moved_moments(model.problem, k, point, *each) for k, each in each_trial]
+    moved = [moved_moments(model.problem, k, point, *in_trial) for k, in_trial in each_trial]
     return InstrumentSupport(np.max(moved, axis=0), contradicted_errors(model, gaussian))
 
 
@@ -267,14 +267,16 @@ def contradicted_errors(model: GaussNewton, gaussian: GaussianPrior) -> np.ndarr
     prior_rhs = prior_rhs - sum(trial.gradient.static_rhs for trial in here.trials)
     prior = here.information.copy()
     prior[layout.errors, layout.errors] += gaussian.precision
-    every = sum(each.information for each in model.displaced)
+    every = sum(of_trial.information for of_trial in model.displaced)
     shared = slice(0, layout.laboratory.stop - layout.laboratory.start)
     # by chance one of twenty instruments, however many trials there are; with two, each contradicts the other
     apart_sd = -ndtri(0.025 / (count if count > 2 else 1))
-    for k, own in enumerate(model.displaced):
-        alone = _posterior(prior + own.information, prior_rhs + right_hand_sides[k], layout.in_root.stop, layout.errors)
+    for k, displaced in enumerate(model.displaced):
+        alone = _posterior(
+            prior + displaced.information, prior_rhs + right_hand_sides[k], layout.in_root.stop, layout.errors
+        )
         rest = prior_rhs + sum(right_hand_sides) - right_hand_sides[k]
-        others = _posterior(prior + every - own.information, rest, layout.in_root.stop, layout.errors)
+        others = _posterior(prior + every - displaced.information, rest, layout.in_root.stop, layout.errors)
         apart = np.abs(alone[0] - others[0]) > apart_sd * np.hypot(alone[1], others[1])
         result[shared] |= apart[shared]
     return result
@@ -286,8 +288,8 @@ def _right_hand_sides(model: GaussNewton) -> list[np.ndarray]:
     result = []
     for k, (trial, displaced) in enumerate(zip(model.here.trials, model.displaced, strict=True)):
         _, lost = trial.forward(pull.coefficients[k])
-        own = pull.displaced[k] - model.problem.displaced_sd[k] * lost[places]
-        result.append(trial.gradient.static_rhs - lost - own @ displaced.gain)
+        pulled = pull.displaced[k] - model.problem.displaced_sd[k] * lost[places]
+        result.append(trial.gradient.static_rhs - lost - pulled @ displaced.gain)
     return result
 
 

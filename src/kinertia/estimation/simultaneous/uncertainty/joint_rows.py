@@ -41,9 +41,16 @@ class JointRows:
         """Make the axes at these poses."""
         turned = pose.rotation
         parent, child = turned[:, virtual.parents], turned[:, virtual.children]
-        own = [joint_axes(parent[:, k], child[:, k], long_axis=each.long_axis) for k, each in enumerate(virtual.joints)]
+        turned_axes = [
+            joint_axes(parent[:, k], child[:, k], long_axis=joint.long_axis) for k, joint in enumerate(virtual.joints)
+        ]
         axes = np.stack(
-            [np.reshape(own, (len(own), *parent[:, 0].shape)).swapaxes(0, 1) if own else parent, child.swapaxes(2, 3)],
+            [
+                np.reshape(turned_axes, (len(turned_axes), *parent[:, 0].shape)).swapaxes(0, 1)
+                if turned_axes
+                else parent,
+                child.swapaxes(2, 3),
+            ],
             axis=2,
         )
         return cls(virtual, pose, first, axes, turned[:, virtual.bases])
@@ -55,9 +62,9 @@ class JointRows:
         """
         result, (d, j) = rows.copy(), self.bases.shape[:2]
         if j:
-            own = rows[:, self.first :].reshape(d, j, 2, 3, -1)[:, :, ::-1]
+            pairs = rows[:, self.first :].reshape(d, j, 2, 3, -1)[:, :, ::-1]
             within = self.axes @ self.bases[:, :, None]
-            result[:, self.first :] = (within @ own).reshape(d, 6 * j, *rows.shape[2:])
+            result[:, self.first :] = (within @ pairs).reshape(d, 6 * j, *rows.shape[2:])
         return result
 
     def by_axes(self, forces: np.ndarray) -> np.ndarray:
@@ -145,11 +152,11 @@ def add_bodies(
     for i in range(axes.shape[0]):
         for b in range(len(segments)):
             for r in range(6):
-                own = by_parameter[i, r, segments[b]]
+                by_body = by_parameter[i, r, segments[b]]
                 for k in range(10):
                     total = 0.0
                     for p in range(10):
-                        total += own[p] * chain[b, p, k]
+                        total += by_body[p] * chain[b, p, k]
                     load[r, 10 * b + k] = total
         for j in range(axes.shape[1]):
             if rows[j] < 0:

@@ -65,7 +65,7 @@ class OfPhases:
             begin = tuple(new.fit(old.evaluate(part)[0]) for new, old, part in rows)
             problems.append(other)
             points.append(search(other, replace(point, coefficients=begin)))
-        every = np.array([each.static for each in points])
+        every = np.array([phase_point.static for phase_point in points])
         apart = (every - every.mean(axis=0)) / np.sqrt((len(every) - 1) * len(every))
         return cls(every.mean(axis=0), apart.T @ apart, tuple(problems), tuple(points))
 
@@ -79,9 +79,9 @@ def followed(model: GaussNewton, point: Point, static: np.ndarray) -> Point:
     problem, motions, displaced = model.problem, [], []
     trials = zip(model.here.trials, model.displaced, problem.displaced_sd, strict=True)
     rows = zip(trials, point.coefficients, point.displaced, strict=True)
-    for (trial, own, sd), part, place in rows:
+    for (trial, eliminated, sd), part, place in rows:
         step = static - point.static
-        moved = -own.gain @ step
+        moved = -eliminated.gain @ step
         step[problem.layout.displaced] += sd * moved
         motions.append(part + trial.following(step))
         displaced.append(place + moved)
@@ -97,14 +97,14 @@ def curves_apart(problems: Sequence[MapProblem], points: Sequence[Point], k: int
     frames, basis = problems[0].trials[k].curve_frames, problems[0].bases[k]
     statics = [problem.in_trial(k, point) for problem, point in zip(problems, points, strict=True)]
     reactions = [problem.loads.reactions(k, static) for problem, static in zip(problems, statics, strict=True)]
-    estimates = [(each.coefficients[k], static) for each, static in zip(points, statics, strict=True)]
+    estimates = [(point_.coefficients[k], static) for point_, static in zip(points, statics, strict=True)]
     joints = len(body_joints(problems[0].skeleton))
     variances = CurveDeviations.filled(len(frames), len(problems[0].moving), joints, 0.0)
     for some in pieces(len(frames)):
         rows = zip(problems, estimates, reactions, strict=True)
         every = [_curves(problem, k, *estimate, loads, frames[some]) for problem, estimate, loads in rows]
-        for variance, *each in zip(variances.curves, *every, strict=True):
-            variance[some] = np.var(each, axis=0, ddof=1)
+        for variance, *samples in zip(variances.curves, *every, strict=True):
+            variance[some] = np.var(samples, axis=0, ddof=1)
     around = 1 + 2 * round(_KNOTS * len(basis.first) / basis.intervals)
     for variance in variances.curves:
         variance[:] = even_mean(variance, around)
@@ -167,45 +167,45 @@ class CostProfile:
         if not len(late):
             return unchanged
         root = model.static.root_of_covariance()
-        across, own, values = root @ root[late].T, late - first, point.static[late]
+        across, places, values = root @ root[late].T, late - first, point.static[late]
         known = np.linalg.inv(across[late])
         sd = float(np.sqrt(across[late].sum()))
         delays = np.array([-sd, 0.0, sd])
-        fixed = [_fixed(instruments, own, values + away / len(own), _FIXING / sd**2) for away in delays]
+        fixed = [_fixed(instruments, places, values + away / len(places), _FIXING / sd**2) for away in delays]
         slope = problem.slope(point)
-        costs = [_without(each, own, *search(model, slope, each), first) for each in fixed]
+        costs = [_without(fixed_prior, places, *search(model, slope, fixed_prior), first) for fixed_prior in fixed]
         curve, slope, _ = np.polyfit(delays, costs, 2)
         if not curve > 0.0:
             return unchanged
-        shown = np.full((len(own), len(own)), 2.0 * curve)
-        rhs = np.full(len(own), 2.0 * curve * values.sum() - slope)
+        shown = np.full((len(places), len(places)), 2.0 * curve)
+        rhs = np.full(len(places), 2.0 * curve * values.sum() - slope)
         gaussian = GaussianPrior.given(ErrorPriors(tuple(priors)), shown, rhs)
         found = np.linalg.solve(shown + gaussian.precision, rhs + gaussian.pull)
-        linear = (known - instruments.precision[np.ix_(own, own)]).mean()
+        linear = (known - instruments.precision[np.ix_(places, places)]).mean()
         information = here.information.copy()
         information[np.ix_(late, late)] += shown - linear
         return cls(
             replace(here, information=information),
-            _with(instruments, own, gaussian.precision, gaussian.pull),
+            _with(instruments, places, gaussian.precision, gaussian.pull),
             point.static + across @ known @ (found - values),
         )
 
 
-def _without(gaussian: GaussianPrior, own: np.ndarray, static: np.ndarray, cost: float, first: int) -> float:
+def _without(gaussian: GaussianPrior, places: np.ndarray, static: np.ndarray, cost: float, first: int) -> float:
     """Return a cost under a Gaussian without its prior of some quantities, which begin at `first` in `static` (S,)."""
-    alone = GaussianPrior(gaussian.precision[np.ix_(own, own)], gaussian.pull[own])
-    return cost - alone.cost(static[first + own])
+    alone = GaussianPrior(gaussian.precision[np.ix_(places, places)], gaussian.pull[places])
+    return cost - alone.cost(static[first + places])
 
 
-def _fixed(gaussian: GaussianPrior, own: np.ndarray, values: np.ndarray, information: float) -> GaussianPrior:
+def _fixed(gaussian: GaussianPrior, places: np.ndarray, values: np.ndarray, information: float) -> GaussianPrior:
     """Return the Gaussian with some quantities fixed at these values by this much information on each."""
-    return _with(gaussian, own, information * np.eye(len(own)), information * values)
+    return _with(gaussian, places, information * np.eye(len(places)), information * values)
 
 
-def _with(gaussian: GaussianPrior, own: np.ndarray, precision: np.ndarray, pull: np.ndarray) -> GaussianPrior:
+def _with(gaussian: GaussianPrior, places: np.ndarray, precision: np.ndarray, pull: np.ndarray) -> GaussianPrior:
     """Return the Gaussian with precision and pull of some quantities replaced."""
     every, pulls = gaussian.precision.copy(), gaussian.pull.copy()
-    every[np.ix_(own, own)], pulls[own] = precision, pull
+    every[np.ix_(places, places)], pulls[places] = precision, pull
     return GaussianPrior(every, pulls)
 
 

@@ -215,11 +215,11 @@ def motion_noise(problem: MapProblem, k: int, coefficients: np.ndarray, static: 
     for frames in (slice(start, stop) for start, stop in pairwise(parts)):
         left = _left(problem, k, coefficients, static, frames)
         n, m, _ = left.shape
-        own = MotionBasis(trial.time[frames], spacing_s)
-        around = 1 + 2 * int(np.ceil(_ENDS * n / (own.first[-1] + 1)))
+        splines = MotionBasis(trial.time[frames], spacing_s)
+        around = 1 + 2 * int(np.ceil(_ENDS * n / (splines.first[-1] + 1)))
         inside = all_around(np.isfinite(left).all(axis=-1), around)
         rows = inside & counted[frames][:, None]
-        for square, part in zip(squares, own.evaluate(own.fit(left.reshape(n, -1))), strict=True):
+        for square, part in zip(squares, splines.evaluate(splines.fit(left.reshape(n, -1))), strict=True):
             square += np.where(rows, np.square(part).reshape(n, m, 3).sum(axis=-1), 0.0).sum(axis=0)
         counts += 3 * rows.sum(axis=0)
     seen = counts > 0
@@ -236,9 +236,9 @@ def _left(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.ndar
     q = problem.model.full(problem.bases[k].evaluate(coefficients, frames), static)[0]
     skeleton, trial = problem.model.placed(static), problem.trials[k]
     at = np.ascontiguousarray(skeleton.map.axes(q))
-    own = in_segments(skeleton.tree, at, skeleton.marker_segments, np.ascontiguousarray(trial.markers[frames]))
+    local = in_segments(skeleton.tree, at, skeleton.marker_segments, np.ascontiguousarray(trial.markers[frames]))
     patterns, along = problem.model.skin(k, static, frames)
-    result: np.ndarray = own - skeleton.marker_locals - patterns.displaced(along)
+    result: np.ndarray = local - skeleton.marker_locals - patterns.displaced(along)
     return result
 
 
@@ -248,9 +248,9 @@ def _expected(problem: MapProblem, k: int, band_hz: float) -> np.ndarray:
     step_s = float(np.median(np.diff(trial.time)))
     hz = np.linspace(0.0, band_hz, _FREQUENCIES)
     process = trial.marker_process[1]
-    one, two = process.of_before
+    lag1, two = process.of_before
     turn = np.exp(-2j * np.pi * step_s * hz)
-    power = 2.0 * step_s * process.new / np.square(np.abs(1.0 - one * turn - two * turn**2)) / trial.repeats
+    power = 2.0 * step_s * process.new / np.square(np.abs(1.0 - lag1 * turn - two * turn**2)) / trial.repeats
     return np.array([np.trapezoid(power * (2.0 * np.pi * hz) ** (2 * order), hz) for order in range(3)])
 
 

@@ -128,7 +128,7 @@ class MomentsOfTrial:
     @cached_property
     def _columns(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Coordinates of the skeleton with virtual axes that move, that do not, and of all rows."""
-        moving, still = (self.virtual.former[own] for own in (self.problem.moving, self.problem.given.still))
+        moving, still = (self.virtual.former[columns] for columns in (self.problem.moving, self.problem.given.still))
         return moving, still, np.concatenate([moving, self.virtual.added.ravel()])
 
     @cached_property
@@ -183,10 +183,10 @@ class MomentsOfTrial:
             skeleton.map.to_coordinates(part.transpose(0, 2, 1), pose.slopes).transpose(0, 2, 1)
             for part in skeleton.map.derivatives_to_coordinates((dq, dv, da), q, qd, qdd)
         )
-        each = np.arange(q.shape[1])
-        by_q[:, each, each] += skeleton.map.turned_forces(tau, q)
+        coordinates = np.arange(q.shape[1])
+        by_q[:, coordinates, coordinates] += skeleton.map.turned_forces(tau, q)
         by_forces = tau, along.reshape(len(q), 12, -1)
-        value, reach = (skeleton.map.to_coordinates(each, pose.slopes)[..., every] for each in by_forces)
+        value, reach = (skeleton.map.to_coordinates(by_force, pose.slopes)[..., every] for by_force in by_forces)
         joints = JointRows.of(self.virtual, pose, len(moving))
         by_q, by_qd, by_qdd = (joints.turned(part.take(every, axis=1)) for part in (by_q, by_qd, by_qdd))
         by_q += joints.by_axes(value)
@@ -215,7 +215,7 @@ class MomentsOfTrial:
         result = np.zeros((2, len(time), 6, problem.layout.in_root.stop))
         loaded = self.reactions.loaded_at(time)
         for by, add in problem.loads.by_errors(k, self.static, late.loads, loaded, frames):
-            for foot, own in enumerate(result):
-                add(own, by[:, foot])
+            for foot, of_foot in enumerate(result):
+                add(of_foot, by[:, foot])
         result[..., problem.loads.delay_unknowns(k)] = late.slope.transpose(1, 0, 2)[..., None]
         return result

@@ -121,9 +121,9 @@ def of_knots(phases: OfPhases) -> Mode:
     """
     (problem, other), (point, there) = phases.problems[:2], phases.points[:2]
     rows = zip(problem.bases, other.bases, point.coefficients, there.coefficients, strict=True)
-    motions = tuple(own.fit(new.evaluate(b)[0]) - own.fit(own.evaluate(a)[0]) for own, new, a, b in rows)
+    motions = tuple(basis.fit(new.evaluate(b)[0]) - basis.fit(basis.evaluate(a)[0]) for basis, new, a, b in rows)
     scale = np.sqrt(0.5)
-    return Mode(scale * (there.static - point.static), tuple(scale * each for each in motions))
+    return Mode(scale * (there.static - point.static), tuple(scale * motion for motion in motions))
 
 
 def of_root(model: GaussNewton, point: Point, root: np.ndarray) -> list[Mode]:
@@ -155,13 +155,15 @@ def posterior_draws(
         modes: other uncertain quantities.
     """
     problem, trials, root = model.problem, model.here.trials, model.static.root_of_covariance()
-    random, count = np.random.default_rng(_SEED), _kept(sum(each.size for each in point.coefficients))
+    random, count = np.random.default_rng(_SEED), _kept(sum(coefficient.size for coefficient in point.coefficients))
     normal, extra = random.standard_normal((count, len(root))), random.standard_normal((count, len(modes)))
     drawn = normal @ root.T
     static = point.static + drawn + extra @ np.array([mode.static for mode in modes])
     of_trials = []
-    for k, (trial, own) in enumerate(zip(trials, roots_in_trials, strict=True)):
-        in_trial = drawn if own is root else _in_trial(drawn, normal, own, problem.layout.in_root.stop)
+    for k, (trial, root_in_trial) in enumerate(zip(trials, roots_in_trials, strict=True)):
+        in_trial = (
+            drawn if root_in_trial is root else _in_trial(drawn, normal, root_in_trial, problem.layout.in_root.stop)
+        )
         motions = _motions(problem.bases[k], trial, in_trial, noises[k], random)
         for motion, shares in zip(motions, extra.astype(motions.dtype), strict=True):  # together they take memory
             for mode, share in zip(modes, shares, strict=True):
@@ -185,9 +187,9 @@ def _kept(size: int) -> int:
 
 def _in_trial(drawn: np.ndarray, normal: np.ndarray, root: np.ndarray, first: int) -> np.ndarray:
     """Return draws (n, S) as they are in a trial: the first unknowns are the same in all."""
-    own = normal.copy()
-    own[:, :first] = np.linalg.solve(root[:first, :first], drawn[:, :first].T).T
-    result: np.ndarray = own @ root.T
+    in_trial = normal.copy()
+    in_trial[:, :first] = np.linalg.solve(root[:first, :first], drawn[:, :first].T).T
+    result: np.ndarray = in_trial @ root.T
     return result
 
 
@@ -236,8 +238,8 @@ class _Steps:
         blocks = part.band.backward(np.ascontiguousarray(rhs), after, in_place=True)
         flat = part.in_order(blocks).reshape(-1, rhs.shape[2]).T
         count, _, c = self.into.shape
-        own = self.into[:, part.splines]
-        own[:] = flat.reshape(count, -1, c)[:, : own.shape[1]]
+        target = self.into[:, part.splines]
+        target[:] = flat.reshape(count, -1, c)[:, : target.shape[1]]
         first: np.ndarray = blocks[0]
         return first
 
@@ -275,10 +277,10 @@ def _narrow(alone: np.ndarray, shares: np.ndarray, basis: MotionBasis) -> None:
     found = least_squares(missing, [np.log(shares.mean()), 0.0, 0.0], bounds=([-20.0] * 3, [20.0] * 3))
     gain = np.exp(0.5 * found.x @ _squares(frames, basis) ** np.arange(3)[:, None])
     for start in range(0, len(alone), some):
-        each = alone[start : start + some]
-        curves = basis.evaluate(_side_by_side(each), derivatives=0)[0]
+        chunk = alone[start : start + some]
+        curves = basis.evaluate(_side_by_side(chunk), derivatives=0)[0]
         narrowed = basis.fit(idct(dct(curves, axis=0) * gain[:, None], axis=0, overwrite_x=True))
-        each[:] = narrowed.reshape(size, len(each), -1).transpose(1, 0, 2)
+        chunk[:] = narrowed.reshape(size, len(chunk), -1).transpose(1, 0, 2)
 
 
 def _side_by_side(series: np.ndarray) -> np.ndarray:
@@ -303,13 +305,13 @@ def _bodies(problem: MapProblem, point: Point, departures: np.ndarray) -> np.nda
     to first order. Impossible bodies are replaced by the nearest possible ones.
     """
     theta, estimate = point.static[problem.layout[BSP]], problem.model.bsp(point.static)
-    dynamic, each = estimate.dynamic_parameters().reshape(-1, 10), departures.reshape(len(departures), -1, 10)
-    moved = np.einsum("sij,nsj->nsi", dynamic_jacobian(theta), each)
+    dynamic, departed = estimate.dynamic_parameters().reshape(-1, 10), departures.reshape(len(departures), -1, 10)
+    moved = np.einsum("sij,nsj->nsi", dynamic_jacobian(theta), departed)
     least = np.maximum(moved[..., 0], (_LEAST_MASS - 1.0) * dynamic[:, 0])
     moved *= (least / np.where(moved[..., 0] == 0.0, 1.0, moved[..., 0]))[..., None]
-    names = tuple(f"{name} {k}" for k in range(len(each)) for name in estimate.segments)
+    names = tuple(f"{name} {k}" for k in range(len(departed)) for name in estimate.segments)
     drawn = BodySegmentParameters.from_dynamic_parameters(names, (dynamic + moved).reshape(-1, 10))
-    return nearest_consistent(drawn).table().reshape(each.shape)
+    return nearest_consistent(drawn).table().reshape(departed.shape)
 
 
 def _trial_draws(

@@ -88,13 +88,13 @@ def one_sided(prior: BspPrior, estimate: BodySegmentParameters, covariance: np.n
     named = np.flatnonzero(masses * np.sign(most) >= _WITH_IT * abs(most))
     heavier, lighter = ("_r", "_l") if most > 0 else ("_l", "_r")
     rows = [estimate.segments.index(f"{names[k]}{side}") for k in named for side in ("_r", "_l")]
-    own = ((estimate.mass_kg - prior.mean.mass_kg) / prior.sd[:, 0])[rows]
+    mass_departures = ((estimate.mass_kg - prior.mean.mass_kg) / prior.sd[:, 0])[rows]
     return OneSided(
         tuple(names[k] + heavier for k in named),
         tuple(names[k] + lighter for k in named),
         tuple(abs(float(after[names[k]].difference[0])) for k in named),
         abs(most),
-        bool(own.sum() > 0),
+        bool(mass_departures.sum() > 0),
     )
 
 
