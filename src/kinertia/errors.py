@@ -309,7 +309,7 @@ class BlockedError(KinertiaError):
         self.findings = tuple(findings)
         self.blocking = tuple(blocking)
         self.finding = self.blocking[0] if self.blocking else None
-        super().__init__("\n".join(f"{one.line()} {one.remedy}" for one in self.blocking))
+        super().__init__("\n".join(f"{blocker.line()} {blocker.remedy}" for blocker in self.blocking))
 
 
 def findings_of(error: KinertiaError) -> tuple[Finding, ...]:
@@ -317,4 +317,4 @@ def findings_of(error: KinertiaError) -> tuple[Finding, ...]:
     if isinstance(error, BlockedError):
         return error.findings
     every = (error, *error.also) if isinstance(error, FileError) else (error,)
-    return tuple(one.finding for one in every if one.finding is not None)
+    return tuple(refusal.finding for refusal in every if refusal.finding is not None)

@@ -135,7 +135,7 @@ class Table(BaseModel):
     def _of_numpy(cls, data: Any) -> Any:
         if not isinstance(data, dict):
             return data
-        return {key: each.tolist() if hasattr(each, "dtype") else each for key, each in data.items()}
+        return {key: value.tolist() if hasattr(value, "dtype") else value for key, value in data.items()}
 
 
 class Subject(Table):
@@ -355,20 +355,20 @@ class Overrule:
 
 
 def _codes(value: object) -> tuple[str, ...]:
-    if not isinstance(value, list | tuple) or not all(isinstance(one, str) for one in value):
+    if not isinstance(value, list | tuple) or not all(isinstance(code, str) for code in value):
         raise ValueError('must be a list of codes, questions or families in quotes, like ["M102", "R40"]')
-    for one in value:
-        if not matching(one):
-            written = one[:1].upper() + one[1:].upper().replace("O", "0")
+    for code in value:
+        if not matching(code):
+            written = code[:1].upper() + code[1:].upper().replace("O", "0")
             near = get_close_matches(written, all_rules(), n=3, cutoff=0.5)
             hint = f"the nearest are {', '.join(near)}" if near else "see kinertia explain"
-            raise ValueError(f"'{one}' is not a code, question or family; {hint}")
+            raise ValueError(f"'{code}' is not a code, question or family; {hint}")
     return tuple(value)
 
 
 def _waivable(value: object) -> tuple[str, ...]:
     codes = _codes(value)
-    if hard := [one for one in codes if one in all_rules() and rule(one).hard]:
+    if hard := [code for code in codes if code in all_rules() and rule(code).hard]:
         raise ValueError(f"'{hard[0]}' cannot be waived, since nothing can be computed with it")
     return codes
 

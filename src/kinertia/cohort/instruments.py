@@ -52,7 +52,7 @@ def drift(rows: pd.DataFrame) -> Iterator[Part]:
     dated = _named(dated)
     names = sorted(dated["instrument"].unique())
     colours = {name: _COLOURS[k % len(_COLOURS)] for k, name in enumerate(names)}
-    panels = [_panel(str(unknown), colours, of) for unknown, of in dated.groupby("unknown", sort=False)]
+    panels = [_panel(str(unknown), colours, of_unknown) for unknown, of_unknown in dated.groupby("unknown", sort=False)]
     people, days = dated["person"].nunique(), dated["date"].nunique()
     without = rows["person"].nunique() - people
     counts = f"{people} people on {days} day{'s' if days > 1 else ''}"
@@ -79,8 +79,8 @@ def _named(rows: pd.DataFrame) -> pd.DataFrame:
 def _panel(unknown: str, colours: Mapping[str, str], rows: pd.DataFrame) -> Panel:
     factor, shown = SHOWN_UNIT[str(rows["unit"].iloc[0])]
     traces = [
-        _line(str(instrument), colours[str(instrument)], factor, of)
-        for instrument, of in rows.groupby("instrument", sort=True, observed=True)
+        _line(str(instrument), colours[str(instrument)], factor, of_instrument)
+        for instrument, of_instrument in rows.groupby("instrument", sort=True, observed=True)
     ]
     return Panel(f"{unknown} ({shown})", traces)
 
@@ -88,14 +88,14 @@ def _panel(unknown: str, colours: Mapping[str, str], rows: pd.DataFrame) -> Pane
 def _line(instrument: str, colour: str, factor: float, rows: pd.DataFrame) -> dict[str, Any]:
     """Draw the value of each day and its error bar, from all its people's trials with one prior."""
     days, means, bars, texts = [], [], [], []
-    for day, of in rows.groupby("date", sort=True):
-        value, sd, prior_sd = (of[name].to_numpy() for name in ("value", "sd", "prior_sd"))
+    for day, of_day in rows.groupby("date", sort=True):
+        value, sd, prior_sd = (of_day[name].to_numpy() for name in ("value", "sd", "prior_sd"))
         information = 1.0 / np.square(sd)
-        total = information.sum() - (len(of) - 1) / float(np.mean(prior_sd)) ** 2
+        total = information.sum() - (len(of_day) - 1) / float(np.mean(prior_sd)) ** 2
         days.append(str(day))
         means.append(float(factor * (information @ value) / total))
         bars.append(float(factor * _WITHIN / np.sqrt(total)))
-        texts.append(f"{len(of)} people")
+        texts.append(f"{len(of_day)} people")
     return {
         "type": "scatter",
         "mode": "lines+markers",

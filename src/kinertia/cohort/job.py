@@ -55,13 +55,21 @@ class Job:
     run: str = field(default_factory=lambda: uuid4().hex)
 
     @classmethod
-    def of(cls, one: Standing, cohort: Path) -> Self:
+    def of(cls, standing: Standing, cohort: Path) -> Self:
         """Create the job of fitting a person who is due, into the folder of the cohort."""
-        if one.person.subject is None:
-            raise ValueError(f"{one.person.name} is not due")
-        limit_s = _LEAST_LIMIT_S + _PATIENCE * guessed_seconds([one], 1)
-        person = one.person
-        return cls(person.name, one.person.subject.resolve(), cohort, one.inputs, one.trials, limit_s, person.session)
+        if standing.person.subject is None:
+            raise ValueError(f"{standing.person.name} is not due")
+        limit_s = _LEAST_LIMIT_S + _PATIENCE * guessed_seconds([standing], 1)
+        person = standing.person
+        return cls(
+            person.name,
+            standing.person.subject.resolve(),
+            cohort,
+            standing.inputs,
+            standing.trials,
+            limit_s,
+            person.session,
+        )
 
     @classmethod
     def of_text(cls, text: str) -> Self:
@@ -91,8 +99,8 @@ class Job:
 
 def guessed_seconds(due: Sequence[Standing], workers: int) -> float:
     """Estimate roughly how long fits take (s), with one processor for each process."""
-    each = [_SECONDS_PER_PERSON + _SECONDS_PER_FRAME * one.frames for one in due]
-    return max(sum(each) / workers, max(each, default=0.0))
+    each_s = [_SECONDS_PER_PERSON + _SECONDS_PER_FRAME * standing.frames for standing in due]
+    return max(sum(each_s) / workers, max(each_s, default=0.0))
 
 
 @dataclass(frozen=True)

@@ -89,8 +89,8 @@ def write_second_study(
     for k, person in enumerate(people):
         progress("reading results", k / len(people))
         everybody.append(_read(cohort, person, notes))
-    once = {one.name for one in _others((), everybody)}
-    twice = [one.name for one in everybody if one.name not in once]
+    once = {fitted_person.name for fitted_person in _others((), everybody)}
+    twice = [fitted_person.name for fitted_person in everybody if fitted_person.name not in once]
     notes += [
         f"{name}: not used for learning, since some of their recordings also belong to another person here"
         for name in twice
@@ -100,11 +100,16 @@ def write_second_study(
         (folder / name).mkdir(parents=True, exist_ok=True)
         for old in (folder / name).glob("*.toml"):
             old.unlink()
-    _teach_bodies(folder / "priors", [one for one in everybody if one.body is not None], notes, progress)
+    _teach_bodies(
+        folder / "priors",
+        [fitted_person for fitted_person in everybody if fitted_person.body is not None],
+        notes,
+        progress,
+    )
     _teach_instruments(folder / "sessions", everybody, notes)
-    if not any(one.entries for one in everybody):
+    if not any(fitted_person.entries for fitted_person in everybody):
         raise KinertiaError(f"nothing can be learnt from these people: {'; '.join(notes)}")
-    second = [_second(folder, one) for one in everybody]
+    second = [_second(folder, fitted_person) for fitted_person in everybody]
     write_then_rename(folder / _DONE, json.dumps({"kinertia": VERSION, "cause": cause, "notes": notes}) + "\n")
     return second, notes
 
@@ -162,63 +167,63 @@ def _teach_bodies(
         found = f"{len(people)} people whose fits can be learnt from"
         notes.append(f"no prior was learnt: {found}; each one needs at least {FEWEST_PEOPLE} others")
         return
-    bodies = [[one.body for one in of if one.body is not None] for of in others]
+    bodies = [[person.body for person in teachers if person.body is not None] for teachers in others]
     try:
         learnt = in_parallel(learn, bodies, None, partial(progress, "learning"))
     except PriorError as error:
         notes.append(f"no prior was learnt: {error}")
         return
-    for k, (part, of, prior) in enumerate(zip(parts, others, learnt, strict=True)):
+    for k, (part, teachers, prior) in enumerate(zip(parts, others, learnt, strict=True)):
         path = folder / f"{k + 1}.toml"
-        write_then_rename(path, _population(of, prior))
-        for one in part:
-            one.entries["prior"] = {"population": str(path.resolve())}
+        write_then_rename(path, _population(teachers, prior))
+        for person in part:
+            person.entries["prior"] = {"population": str(path.resolve())}
 
 
 def _others(part: Sequence[_Known], people: Sequence[_Known]) -> list[_Known]:
     """Return the people who share no recording with this part or with someone before: each counts once."""
-    met = {name for one in part for name in one.recordings}
+    met = {name for person in part for name in person.recordings}
     others = []
-    for one in people:
-        if not met & set(one.recordings):
-            others.append(one)
-            met.update(one.recordings)
+    for person in people:
+        if not met & set(person.recordings):
+            others.append(person)
+            met.update(person.recordings)
     return others
 
 
 def _population(people: Sequence[_Known], learnt: LearntPrior) -> str:
-    files = [name for one in people for name in one.recordings]
-    return population_text(learnt.as_file(VERSION, [one.name for one in people], files))
+    files = [name for person in people for name in person.recordings]
+    return population_text(learnt.as_file(VERSION, [person.name for person in people], files))
 
 
 def _teach_instruments(folder: Path, people: Sequence[_Known], notes: list[str]) -> None:
     """Write the combined information of each day's people on their plates and synchronisation."""
     days: dict[tuple[datetime.date, str], list[_Known]] = {}
     undated = 0
-    for one in people:
-        if one.instruments is None:
+    for person in people:
+        if person.instruments is None:
             continue
-        day = session_date(one.wanted)
+        day = session_date(person.wanted)
         if day is None:
             undated += 1
         else:
-            days.setdefault((day, _stated(one.wanted.instruments)), []).append(one)
+            days.setdefault((day, _stated(person.wanted.instruments)), []).append(person)
     if undated:
         notes.append(
             f"{undated} people without a date ([instruments] date): their plate and synchronisation errors are not "
             "shared"
         )
     for k, ((day, _), of_day) in enumerate(sorted(days.items(), key=lambda item: item[0])):
-        sharing = [one for one in of_day if _plates([one]) & _plates(_others([one], of_day))]
+        sharing = [person for person in of_day if _plates([person]) & _plates(_others([person], of_day))]
         if not sharing:
             continue
-        said = [one.instruments for one in _others((), of_day) if one.instruments is not None]
+        said = [person.instruments for person in _others((), of_day) if person.instruments is not None]
         session = session_instruments(said, of_day[0].wanted.instruments)
-        notes += [f"{day}: {one.line()} {one.remedy}" for one in session.contradictions]
+        notes += [f"{day}: {contradiction.line()} {contradiction.remedy}" for contradiction in session.contradictions]
         path = folder / f"{day}-{k + 1}.toml"
         write_then_rename(path, session_text(path.name, VERSION, session.found, session.people))
-        for one in sharing:
-            one.entries["instruments"] = {"session": str(path.resolve())}
+        for person in sharing:
+            person.entries["instruments"] = {"session": str(path.resolve())}
 
 
 def _stated(instruments: InstrumentsFiles) -> str:
@@ -228,26 +233,26 @@ def _stated(instruments: InstrumentsFiles) -> str:
 
 def _plates(people: Sequence[_Known]) -> set[str]:
     """Return the plates on which these people stood."""
-    return {plate for one in people if one.instruments is not None for plate in one.instruments.plates}
+    return {plate for person in people if person.instruments is not None for plate in person.instruments.plates}
 
 
-def _second(folder: Path, one: _Known) -> Participant:
+def _second(folder: Path, person: _Known) -> Participant:
     """Write the person's subject file with what was learnt, and with absolute paths."""
-    content = read_toml(one.subject, "a subject file").content
-    tables = {name: _from_everywhere(value, one.subject.parent) for name, value in content.items()}
-    tables["subject"] = {**tables["subject"], "name": one.wanted.subject.name}
-    for table, entries in one.entries.items():
+    content = read_toml(person.subject, "a subject file").content
+    tables = {name: _from_everywhere(value, person.subject.parent) for name, value in content.items()}
+    tables["subject"] = {**tables["subject"], "name": person.wanted.subject.name}
+    for table, entries in person.entries.items():
         tables[table] = {**tables.get(table, {}), **entries}
-    path = _subject_of(folder, one.name)
-    heading = f"{one.name}, refitted with group data; written by kinertia cohort --learn"
+    path = _subject_of(folder, person.name)
+    heading = f"{person.name}, refitted with group data; written by kinertia cohort --learn"
     write_then_rename(path, subject_text(tables, heading))
-    return Participant(one.name, path)
+    return Participant(person.name, path)
 
 
 def _from_everywhere(value: Any, folder: Path) -> Any:
     """Return a table of a subject file with absolute paths."""
     if isinstance(value, list):
-        return [_from_everywhere(one, folder) for one in value]
+        return [_from_everywhere(item, folder) for item in value]
     if not isinstance(value, dict):
         return value
     absolute = dict(value)

@@ -141,7 +141,9 @@ def score_parts(folder: Path) -> Iterator[Part]:
     scores: pd.DataFrame = parquet.read_table(folder / "scores.parquet").to_pandas()
     if not len(scores):
         return
-    rows = sorted((_score_row(str(person), own) for person, own in scores.groupby("person")), key=lambda row: -row[0])
+    rows = sorted(
+        (_score_row(str(person), of_person) for person, of_person in scores.groupby("person")), key=lambda row: -row[0]
+    )
     known = [score for score, _ in rows if score >= 0]
     text = "Gait Profile Score (Baker 2009) against the norms, degrees, the largest first."
     if known:
@@ -152,17 +154,17 @@ def score_parts(folder: Path) -> Iterator[Part]:
     )
 
 
-def _score_row(person: str, own: pd.DataFrame) -> tuple[float, tuple[str, ...]]:
+def _score_row(person: str, scores: pd.DataFrame) -> tuple[float, tuple[str, ...]]:
     """Return the overall score, -1 where there is none, and the cells."""
-    gps = own[own["score"] == "GPS"].set_index("side")["degrees"]
-    variables = own[own["score"] == "GVS"].dropna(subset=["degrees"])
+    gps = scores[scores["score"] == "GPS"].set_index("side")["degrees"]
+    variables = scores[scores["score"] == "GVS"].dropna(subset=["degrees"])
     farthest = ""
     if len(variables):
         worst = variables.iloc[int(variables["degrees"].argmax())]
         farthest = f"{worst['variable']}, {SIDES[worst['side']][0]}: {worst['degrees']:.1f}"
     overall = float(gps.get("both", np.nan))
     cells = (*(_degrees(float(gps.get(side, np.nan))) for side in ("both", "r", "l")), farthest)
-    return overall if np.isfinite(overall) else -1.0, (report_of(person), *cells, str(own["remarks"].iloc[0]))
+    return overall if np.isfinite(overall) else -1.0, (report_of(person), *cells, str(scores["remarks"].iloc[0]))
 
 
 def _degrees(value: float) -> str:
@@ -248,26 +250,26 @@ def outcome_parts(people: pd.DataFrame, findings: pd.DataFrame) -> Iterator[Part
 def _by_code(findings: pd.DataFrame, fitted: set[str]) -> list[tuple[str, ...]]:
     """Return a row for each code, the worst and most frequent first."""
     rows = []
-    for code, of in findings.groupby("code", observed=True):
-        severity = max(Severity[name] for name in of["severity"].unique())
-        muted = of["muted_by"].notna() & (of["status"] == "open")
-        overruled, people = of["status"] != "open", of["person"].unique().tolist()
+    for code, of_code in findings.groupby("code", observed=True):
+        severity = max(Severity[name] for name in of_code["severity"].unique())
+        muted = of_code["muted_by"].notna() & (of_code["status"] == "open")
+        overruled, people = of_code["status"] != "open", of_code["person"].unique().tolist()
         counts = [
             len(people),
-            len(of) - int(overruled.sum()) - int(muted.sum()),
+            len(of_code) - int(overruled.sum()) - int(muted.sum()),
             int(muted.sum()),
             int(overruled.sum()),
         ]
         names = Markup(", ").join(report_of(name) if name in fitted else escape(name) for name in people[:_MOST_NAMES])
         cells = (linked(str(code)), severity.name, rule(str(code)).name.replace("-", " "), *map(str, counts))
         more = names + (", ..." if len(people) > _MOST_NAMES else "")
-        rows.append(((-severity, -len(people), str(code)), (*cells, _median(of), more)))
+        rows.append(((-severity, -len(people), str(code)), (*cells, _median(of_code), more)))
     return [cells for _, cells in sorted(rows, key=lambda row: row[0])]
 
 
-def _median(of: pd.DataFrame) -> str:
+def _median(findings: pd.DataFrame) -> str:
     """Return the median size of the headlines; empty where there is none."""
-    known = of.dropna(subset=["value"])
+    known = findings.dropna(subset=["value"])
     if not len(known):
         return ""
     return shown(Quantity(float(np.median(known["value"].abs())), str(known["unit"].iloc[0])))
@@ -281,8 +283,15 @@ def overruled_in_vain(people: pd.DataFrame, findings: pd.DataFrame) -> list[str]
 
 
 def _meaning(code: str) -> Markup:
-    one = with_limits(rule(code))
-    texts = (code, code, one.name.replace("-", " "), one.detects, outlined(one.effect), outlined(one.remedy))
+    explained = with_limits(rule(code))
+    texts = (
+        code,
+        code,
+        explained.name.replace("-", " "),
+        explained.detects,
+        outlined(explained.effect),
+        outlined(explained.remedy),
+    )
     return Markup('<strong id="explain-{}">{} {}</strong>: {} {} {}').format(*texts)
 
 

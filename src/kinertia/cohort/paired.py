@@ -63,29 +63,33 @@ def pairs_of(people: Sequence[Participant], conditions: tuple[str, str]) -> list
         SettingsError: nobody has both.
     """
     sessions: dict[str, dict[str, str]] = {}
-    for one in people:
-        if one.session in conditions:
-            sessions.setdefault(one.person, {})[one.session] = one.name
+    for participant in people:
+        if participant.session in conditions:
+            sessions.setdefault(participant.person, {})[participant.session] = participant.name
     pairs = {
-        person: Pair(person, tuple(own[name] for name in conditions))
-        for person, own in sessions.items()
-        if len(own) == len(set(conditions)) == 2
+        person: Pair(person, tuple(sessions_of[name] for name in conditions))
+        for person, sessions_of in sessions.items()
+        if len(sessions_of) == len(set(conditions)) == 2
     }
-    stated: set[str] = {one.session for one in people}
-    for one in people:
-        own_conditions = set() if one.session else _conditions(one)
+    stated: set[str] = {participant.session for participant in people}
+    for participant in people:
+        own_conditions = set() if participant.session else _conditions(participant)
         stated |= own_conditions
         if set(conditions) <= own_conditions and len(set(conditions)) == 2:
-            pairs.setdefault(one.person, Pair(one.person, (one.name,)))
+            pairs.setdefault(participant.person, Pair(participant.person, (participant.name,)))
     if not pairs:
         known = ", ".join(sorted(filter(None, stated))) or "none"
         raise SettingsError(f"nobody has sessions or conditions {' and '.join(conditions)}; stated are: {known}")
-    return [pairs.get(name, Pair(name, ())) for name in dict.fromkeys(one.person for one in people)]
+    return [pairs.get(name, Pair(name, ())) for name in dict.fromkeys(participant.person for participant in people)]
 
 
-def _conditions(one: Participant) -> set[str]:
+def _conditions(participant: Participant) -> set[str]:
     try:
-        return set() if one.subject is None else {trial.condition for trial in read_subject(one.subject).trials}
+        return (
+            set()
+            if participant.subject is None
+            else {trial.condition for trial in read_subject(participant.subject).trials}
+        )
     except KinertiaError:
         return set()  # the list of people states what is wrong
 
@@ -117,7 +121,7 @@ def _changes(case: tuple[Path, Pair, tuple[str, str]]) -> PersonChanges:
     except KinertiaError as error:
         return PersonChanges(pair.person, remarks=one_line(str(error)))
     changes = (*found.steps, *found.outcomes)
-    write_then_rename(kept, json.dumps({"cause": cause, "changes": [asdict(one) for one in changes]}) + "\n")
+    write_then_rename(kept, json.dumps({"cause": cause, "changes": [asdict(change) for change in changes]}) + "\n")
     return PersonChanges(pair.person, changes)
 
 
@@ -127,25 +131,25 @@ def _kept(path: Path, cause: str) -> tuple[Change, ...] | None:
         content = json.loads(path.read_text(encoding="utf-8"))
         if content["cause"] != cause:
             return None
-        return tuple(Change(**{**one, **_pairs(one)}) for one in content["changes"])
+        return tuple(Change(**{**entry, **_pairs(entry)}) for entry in content["changes"])
     except (OSError, ValueError, TypeError, KeyError):
         return None
 
 
-def _pairs(one: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: tuple(one[name]) for name in ("strides", "stride_sd")}
+def _pairs(entry: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: tuple(entry[name]) for name in ("strides", "stride_sd")}
 
 
 def means_of(people: Sequence[PersonChanges]) -> tuple[GroupChange, ...]:
     """Average the changes over people."""
-    return group_changes({one.person: one.changes for one in people})
+    return group_changes({changed.person: changed.changes for changed in people})
 
 
 def changes_sentence(people: Sequence[PersonChanges]) -> str:
     """State how many people are compared, and why others are not."""
-    compared = sum(bool(one.changes) for one in people)
+    compared = sum(bool(changed.changes) for changed in people)
     sentence = f"{compared} of {len(people)} people compared: changes.csv, change_means.csv"
-    lacking = [f"{one.person}: {one.remarks}" for one in people if not one.changes]
+    lacking = [f"{changed.person}: {changed.remarks}" for changed in people if not changed.changes]
     return f"{sentence}; not compared: {'; '.join(lacking)}" if lacking else sentence
 
 

@@ -75,7 +75,7 @@ def _of_folders(study: Path, output: Path) -> Iterator[Participant]:
         elif _holds_recordings(folder):
             init = command_line(["kinertia", "init", str(folder)])
             yield Participant(folder.name, None, f"no subject file; {init} drafts one")
-        elif deeper := [each.name for each in _shown(folder) if each.is_dir() and _is_session(each, output)]:
+        elif deeper := [inner.name for inner in _shown(folder) if inner.is_dir() and _is_session(inner, output)]:
             problem = (
                 f"no subject file, but there are files in its folder{'s' if deeper[1:] else ''} {', '.join(deeper)}; "
                 f"write one in {folder} that names them, or list people in a CSV file"

@@ -98,7 +98,7 @@ class Place:
         nothing.
         """
         records = (_read(self.results / RECORD), _read(self.failure))
-        return next((one for one in records if one and (one.inputs, one.kinertia) == (inputs, VERSION)), None)
+        return next((known for known in records if known and (known.inputs, known.kinertia) == (inputs, VERSION)), None)
 
 
 @dataclass(frozen=True)
@@ -217,9 +217,9 @@ def _contents(value: Any) -> Any:
     if isinstance(value, Path):
         return sha256(value)
     if isinstance(value, Mapping):
-        return {key: _contents(each) for key, each in value.items()}
+        return {key: _contents(content) for key, content in value.items()}
     if isinstance(value, list | tuple):
-        return [_contents(each) for each in value]
+        return [_contents(content) for content in value]
     return value
 
 

@@ -168,8 +168,8 @@ def write_tables(
     from pyarrow import parquet
 
     with _tables_in(cohort, with_csv, ("people", *(_CHANGES if changes else ()))) as tables:
-        for one in changes:
-            tables["changes"].add(_table("changes", one.columns()))
+        for change in changes:
+            tables["changes"].add(_table("changes", change.columns()))
         tables["change_means"].add(_table("change_means", group_columns(means_of(changes))))
         for record in records:
             tables["people"].add(_table("people", {name: [value] for name, value in asdict(record).items()}))
@@ -245,16 +245,18 @@ def _trials(fit: Fit) -> dict[str, Any]:
     rows = []
     for of_trial, trial in zip(summary(fit)["trials"], fit.trials, strict=True):
         row = {
-            f"{key}_{stage}": one
+            f"{key}_{stage}": value_of_stage
             for key, value in of_trial.items()
             if isinstance(value, dict)
-            for stage, one in value.items()
+            for stage, value_of_stage in value.items()
         }
-        own = Overview([one for one in fit.findings if one.where.trial in (None, trial.name)], 0, 1)
+        overview = Overview([finding for finding in fit.findings if finding.where.trial in (None, trial.name)], 0, 1)
         row |= {key: value for key, value in of_trial.items() if not isinstance(value, dict)}
-        row |= {"trial": trial.name, "seconds": row["seconds_total"], "verdict": own.verdict}
+        row |= {"trial": trial.name, "seconds": row["seconds_total"], "verdict": overview.verdict}
         row |= dict(zip(("window_start_s", "window_end_s"), of_trial["window_s"], strict=True))
-        row["errors"] = " ".join(dict.fromkeys(one.code for one in own.open if one.severity is Severity.ERROR))
+        row["errors"] = " ".join(
+            dict.fromkeys(finding.code for finding in overview.open if finding.severity is Severity.ERROR)
+        )
         rows.append(row)
     return {name: [row[name] for row in rows] for name in _COLUMNS["trials"] if name != "person"}
 

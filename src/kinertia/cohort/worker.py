@@ -80,7 +80,7 @@ def _fitted(job: Job, started: float) -> Record:
         record = job.record(BAD_INPUT, str(error), _unchanged(job), time.perf_counter() - started)
         return replace(record, overruled=overruled)
     overview = fit.overview
-    against = [one.line() for one in overview.open if one.severity is Severity.ERROR]
+    against = [finding.line() for finding in overview.open if finding.severity is Severity.ERROR]
     against += [f"{name} left out" for name in overview.left_out]
     record = job.record(AGAINST if overview.failed else PASSED, "; ".join(against), True, time.perf_counter() - started)
     record = replace(record, verdict=overview.verdict, overruled=overruled)
@@ -91,7 +91,7 @@ def _fitted(job: Job, started: float) -> Record:
 def _overruled(wanted: SubjectFile) -> str:
     """Return the codes that the subject file waives or ignores, for all trials or single ones."""
     given = [wanted.diagnostics.overrule, *(trial.diagnostics.overrule for trial in wanted.trials)]
-    return " ".join(dict.fromkeys(code for each in given for code in (*each.waive, *each.ignore)))
+    return " ".join(dict.fromkeys(code for overrule in given for code in (*overrule.waive, *overrule.ignore)))
 
 
 def _save(fit: Fit, wanted: SubjectFile, job: Job, record: Record) -> None:

@@ -99,7 +99,7 @@ def limits_of(code: str) -> Mapping[str, Limit]:
 
 
 def _rendered(text: str, limits: Mapping[str, Limit]) -> str:
-    def one(match: re.Match[str]) -> str:
+    def limit_text(match: re.Match[str]) -> str:
         name, part, style = match.groups()
         if name not in limits:
             return match.group(0)
@@ -112,4 +112,4 @@ def _rendered(text: str, limits: Mapping[str, Limit]) -> str:
         ends: dict[str, float | tuple[float, float]] = {"usual": (least, most), "least": least, "most": most}
         return exact(ends[part], limit.unit, style or "")
 
-    return _NAME.sub(one, text)
+    return _NAME.sub(limit_text, text)

@@ -62,10 +62,10 @@ def exact(value: float | tuple[float, ...], unit: str, style: str = "") -> str:
     ('7.5 mm', '5 %', '-25 to 25 ms', '5000 kg/m3')
     """
     values = value if isinstance(value, tuple) else (value,)
-    factor, name, _ = _scaled(unit, max(abs(one) for one in values))
+    factor, name, _ = _scaled(unit, max(abs(number) for number in values))
     if style == "%":
         factor, name = 100.0, "%"
-    texts = (f"{factor * one:{'.0f' if abs(factor * one) >= 1000.0 else '.3g'}}" for one in values)
+    texts = (f"{factor * number:{'.0f' if abs(factor * number) >= 1000.0 else '.3g'}}" for number in values)
     return f"{' to '.join(texts)} {name}".rstrip()
 
 
@@ -79,13 +79,13 @@ def filled(template: str, where: Where, evidence: Mapping[str, Quantity]) -> str
     """Fill a sentence of the catalogue with evidence and places: `{level_n}`, `{share:%}`, `{frames:#}`, `{plate}`."""
     places = _places(where)
 
-    def one(match: re.Match[str]) -> str:
+    def replacement(match: re.Match[str]) -> str:
         name, style = match.group(1), match.group(2) or ""
         if name in evidence:
             return shown(evidence[name], style)
         return places[name]() if name in places else match.group(0)
 
-    return _FIELD.sub(one, template)
+    return _FIELD.sub(replacement, template)
 
 
 def outlined(template: str, mark: str = "<{}>") -> str:

@@ -100,7 +100,7 @@ class Finding:
     @property
     def headline(self) -> Quantity | None:
         """First quantity of the evidence that is a number."""
-        return next((one for one in self.evidence.values() if isinstance(one.value, float | int)), None)
+        return next((quantity for quantity in self.evidence.values() if isinstance(quantity.value, float | int)), None)
 
     @property
     def is_open(self) -> bool:

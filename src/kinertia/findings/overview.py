@@ -50,11 +50,11 @@ class Overview:
 
     def count(self, severity: Severity) -> int:
         """Count the open findings of this severity."""
-        return sum(one.severity is severity for one in self.open)
+        return sum(finding.severity is severity for finding in self.open)
 
     def lines(self, *severities: Severity) -> tuple[str, ...]:
         """Return the open findings of these severities, a line each, the most important first."""
-        return tuple(one.line() for one in self.open if one.severity in severities)
+        return tuple(finding.line() for finding in self.open if finding.severity in severities)
 
     @property
     def failed(self) -> bool:
@@ -64,13 +64,17 @@ class Overview:
     @property
     def waived(self) -> list[Finding]:
         """ERRORs that the user has overruled."""
-        return [one for one in self.findings if one.status == "waived" and one.muted_by is None]
+        return [finding for finding in self.findings if finding.status == "waived" and finding.muted_by is None]
 
     @property
     def severity(self) -> Severity:
         """Worst severity of the open findings; a waived ERROR, and one of a trial left out, count as a WARNING."""
-        used = [one for one in self.open if one.where.trial not in self.left_out or len(self.left_out) >= self.trials]
-        worst = max((one.severity for one in used), default=Severity.INFO)
+        used = [
+            finding
+            for finding in self.open
+            if finding.where.trial not in self.left_out or len(self.left_out) >= self.trials
+        ]
+        worst = max((finding.severity for finding in used), default=Severity.INFO)
         return max(worst, Severity.WARNING) if self.waived or self.left_out else worst
 
     @property
@@ -86,13 +90,13 @@ class Overview:
         import pandas as pd
 
         found = in_order(self.findings)
-        return pd.DataFrame({**finding_columns(found), "message": [one.message for one in found]})
+        return pd.DataFrame({**finding_columns(found), "message": [finding.message for finding in found]})
 
     @property
     def line(self) -> str:
         """Verdict with its basis, in plain sentences."""
         open_ones = (_counted(self.count(Severity.ERROR), "error"), _counted(self.count(Severity.WARNING), "warning"))
-        ignored = sum(one.status == "ignored" and one.muted_by is None for one in self.findings)
+        ignored = sum(finding.status == "ignored" and finding.muted_by is None for finding in self.findings)
         parts = [
             " and ".join(filter(None, open_ones)),
             _counted(self.count(Severity.CORRECTED), "error", "corrected"),
@@ -120,7 +124,9 @@ class Overview:
     def markers_only(self) -> set[str | None]:
         """Names of the trials of which only the markers are used: on request (P280), or because forces are unusable
         (P283)."""
-        asked, refused = ({one.where.trial for one in self.findings if one.code == code} for code in ("P280", "P283"))
+        asked, refused = (
+            {finding.where.trial for finding in self.findings if finding.code == code} for code in ("P280", "P283")
+        )
         return asked - set(self.left_out) | refused
 
 
@@ -139,15 +145,15 @@ def _counted(count: int, noun: str, done: str = "") -> str:
 def in_order(findings: Iterable[Finding]) -> list[Finding]:
     """Sort findings, the worst first; equals by concerning all trials first, then by stage."""
 
-    def importance(one: Finding) -> tuple[int, bool, int, str]:
-        return -one.severity, one.where.trial is not None, STAGES.index(one.rule.stage), one.code
+    def importance(finding: Finding) -> tuple[int, bool, int, str]:
+        return -finding.severity, finding.where.trial is not None, STAGES.index(finding.rule.stage), finding.code
 
     return sorted(findings, key=importance)
 
 
 def reported(findings: Iterable[Finding], least: Severity = Severity.CORRECTED) -> list[Finding]:
     """Return open findings from this severity on, in order; assumptions and advice are left out by default."""
-    return in_order(one for one in findings if one.is_open and one.severity >= least)
+    return in_order(finding for finding in findings if finding.is_open and finding.severity >= least)
 
 
 def consequences(findings: Sequence[Finding], causes: Iterable[Finding]) -> list[Finding]:
@@ -156,25 +162,25 @@ def consequences(findings: Sequence[Finding], causes: Iterable[Finding]) -> list
     waiting = list(causes)
     while waiting:
         cause = waiting.pop()
-        for one in findings:
-            if one.muted_by == cause.code and cause.where.overlaps(one.where) and one not in found:
-                found.append(one)
-                waiting.append(one)
+        for finding in findings:
+            if finding.muted_by == cause.code and cause.where.overlaps(finding.where) and finding not in found:
+                found.append(finding)
+                waiting.append(finding)
     return in_order(found)
 
 
 def finding_columns(found: Sequence[Finding]) -> dict[str, Any]:
     """Return the columns of a table of findings, with the headline's value."""
-    heads = [one.headline for one in found]
+    heads = [finding.headline for finding in found]
     return {
-        "trial": [one.where.trial for one in found],
-        "plate": [one.where.plate for one in found],
-        "code": [one.code for one in found],
-        "severity": [one.severity.name for one in found],
-        "status": [one.status for one in found],
-        "muted_by": [one.muted_by for one in found],
-        "value": [None if one is None else float(one.value) for one in heads],  # type: ignore[arg-type]
-        "unit": [None if one is None else one.unit for one in heads],
+        "trial": [finding.where.trial for finding in found],
+        "plate": [finding.where.plate for finding in found],
+        "code": [finding.code for finding in found],
+        "severity": [finding.severity.name for finding in found],
+        "status": [finding.status for finding in found],
+        "muted_by": [finding.muted_by for finding in found],
+        "value": [None if head is None else float(head.value) for head in heads],  # type: ignore[arg-type]
+        "unit": [None if head is None else head.unit for head in heads],
     }
 
 
@@ -194,7 +200,7 @@ class Group:
         """Message of the first finding, with the number of further places."""
         if len(self.findings) == 1:
             return self.first.message
-        places = [_place(one) for one in self.findings]
+        places = [_place(finding) for finding in self.findings]
         named = [place for place in places[1:] if place and place != places[0]]
         also = f"also {first_few(named, 3)}" if named else f"{len(places) - 1} more"
         return f"{self.first.message.rstrip('.')} ({also})."
@@ -209,14 +215,21 @@ class Group:
 def grouped(findings: Iterable[Finding]) -> list[Group]:
     """Group findings of the same code, file, trial and severity, in order."""
     groups: dict[tuple[object, ...], list[Finding]] = {}
-    for one in findings:
-        alike = (one.code, one.where.file, one.where.trial, one.severity, one.status, one.muted_by)
-        groups.setdefault(alike, []).append(one)
-    return [Group(tuple(each)) for each in groups.values()]
+    for finding in findings:
+        alike = (
+            finding.code,
+            finding.where.file,
+            finding.where.trial,
+            finding.severity,
+            finding.status,
+            finding.muted_by,
+        )
+        groups.setdefault(alike, []).append(finding)
+    return [Group(tuple(alike_findings)) for alike_findings in groups.values()]
 
 
-def _place(one: Finding) -> str:
-    where = one.where
+def _place(finding: Finding) -> str:
+    where = finding.where
     if where.plate or where.axis:
         return " on ".join(filter(None, (where.axis, where.plate)))
     return (where.markers[0] if where.markers else None) or where.part or ""

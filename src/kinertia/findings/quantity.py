@@ -31,7 +31,9 @@ class Quantity:
         others = {"limit": self.limit, "usual": self.usual, "sd": self.sd}
         value = list(self.value) if isinstance(self.value, tuple) else self.value
         return {"value": value, "unit": self.unit} | {
-            name: list(each) if isinstance(each, tuple) else each for name, each in others.items() if each is not None
+            name: list(entry) if isinstance(entry, tuple) else entry
+            for name, entry in others.items()
+            if entry is not None
         }
 
 
@@ -105,8 +107,8 @@ class Where:
     def overlaps(self, other: "Where") -> bool:
         """Return whether both may concern the same: equal or unstated in each respect, with common marker and time."""
         for name in ("trial", "plate", "axis", "part"):
-            own, others = getattr(self, name), getattr(other, name)
-            if own is not None and others is not None and own != others:
+            mine, others = getattr(self, name), getattr(other, name)
+            if mine is not None and others is not None and mine != others:
                 return False
         if self.markers and other.markers and not set(self.markers) & set(other.markers):
             return False

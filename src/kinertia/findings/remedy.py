@@ -71,7 +71,7 @@ def remedies(alike: Sequence[Finding], windows: Mapping[str, Sequence[Span]]) ->
     first = alike[0]
     trial = first.where.trial if first.where.trial in windows else None
     names = dict.fromkeys([*first.rule.settings, *(["trial"] if first.severity is Severity.ERROR else [])])
-    found = [one for name in names for one in _proposed(name, alike, windows)]
+    found = [remedy for name in names for remedy in _proposed(name, alike, windows)]
     level = _OVERRULES.get(first.severity)
     if level is not None and not first.rule.hard and (first.rule.stage != "file"):
         found.append(Remedy(DIAGNOSTICS, level, first.code, trial or ""))
@@ -94,13 +94,15 @@ def _proposed(name: str, alike: Sequence[Finding], windows: Mapping[str, Sequenc
         case "model.static":
             known = True
         case "trial.window_s":
-            value = _rest(windows[trial], [one.where.span_s for one in alike if one.where.span_s is not None])
+            value = _rest(
+                windows[trial], [finding.where.span_s for finding in alike if finding.where.span_s is not None]
+            )
             known = value is not None
         case "model.window_s":
             value = None if where.span_s is None else _rounded(where.span_s)
             known = value is not None
         case "trial.leave_out":
-            value = list(dict.fromkeys(label for one in alike for label in one.where.markers))
+            value = list(dict.fromkeys(label for finding in alike for label in finding.where.markers))
             known = bool(value)
         case _:
             value = _of_evidence(alike[0], source or key)
@@ -124,11 +126,11 @@ def _rounded(span: Span) -> list[float]:
     return [round(end, 3) for end in span]
 
 
-def _of_evidence(one: Finding, name: str) -> Any:
+def _of_evidence(finding: Finding, name: str) -> Any:
     """Return the value of a piece of evidence: a number to four digits, `true`, or a list that is written as TOML."""
     if name == "true":
         return True
-    quantity = one.evidence.get(name)
+    quantity = finding.evidence.get(name)
     if quantity is None:
         return None
     if isinstance(quantity.value, str):

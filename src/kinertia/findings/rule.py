@@ -90,19 +90,19 @@ def questions(family: str) -> dict[str, str]:
 
 def all_rules() -> dict[str, Rule]:
     """Return all rules of the catalogue, and those of installed packages."""
-    return {code: one for family in (*FAMILIES, *names(RULES)) for code, one in rules(family).items()}
+    return {code: known for family in (*FAMILIES, *names(RULES)) for code, known in rules(family).items()}
 
 
 def matching(code: str) -> tuple[str, ...]:
     """Return the codes covered by a code, a question ("P21") or a family ("P"); empty where it is unknown."""
-    return tuple(one for one in rules(code[:1]) if one.startswith(code))
+    return tuple(known for known in rules(code[:1]) if known.startswith(code))
 
 
 def nearest(code: str) -> tuple[str, ...]:
     """Return up to three known codes most similar to an unknown one, by code or by the rule's name."""
-    names = {one.name: one.code for one in all_rules().values()}
+    names = {known.name: known.code for known in all_rules().values()}
     close = [*get_close_matches(code.lower(), list(names), n=1), *get_close_matches(code, [*names.values()], n=3)]
-    return tuple(names.get(one, one) for one in close[:3])
+    return tuple(names.get(similar, similar) for similar in close[:3])
 
 
 @cache

@@ -55,10 +55,10 @@ def _recording(subject: Any, trial: int, name: str) -> Recording:
     )
     time = subject.getTrialTimestep(trial) * np.arange(len(frames))
     seen = [dict(frame.markerObservations) for frame in frames]
-    labels = tuple(dict.fromkeys(label for one in seen for label in one))
+    labels = tuple(dict.fromkeys(label for places in seen for label in places))
     positions = np.full((len(frames), len(labels), 3), np.nan)
-    for row, one in zip(positions, seen, strict=True):
-        for label, place in one.items():
+    for row, places in zip(positions, seen, strict=True):
+        for label, place in places.items():
             row[labels.index(label)] = place
     markers, mass_kg, height_m = Markers(time, labels, positions), subject.getMassKg(), subject.getHeightM()
     return Recording(name, markers, _plates(frames, time), mass_kg=_stated(mass_kg), height_m=_stated(height_m))
@@ -72,13 +72,13 @@ def _stated(value: float) -> float | None:
 def _plates(frames: Any, time: np.ndarray) -> PlateLoads | None:
     """Return the loads at the frames as the plates measured them; None without plates."""
     force, torque, point = (
-        np.array([[np.asarray(one) for one in getattr(frame, name)] for frame in frames], dtype=float)
+        np.array([[np.asarray(vector) for vector in getattr(frame, name)] for frame in frames], dtype=float)
         for name in ("rawForcePlateForces", "rawForcePlateTorques", "rawForcePlateCenterOfPressures")
     )
     if force.ndim < 3 or force.shape[1] == 0:
         return None
     loaded = np.isfinite(force).all(axis=2) & np.isfinite(torque).all(axis=2) & np.isfinite(point).all(axis=2)
-    force, torque, point = (np.where(loaded[..., None], each, 0.0) for each in (force, torque, point))
+    force, torque, point = (np.where(loaded[..., None], component, 0.0) for component in (force, torque, point))
     names = tuple(f"plate {k + 1}" for k in range(force.shape[1]))
     return PlateLoads(time, names, force, about_origin(force, torque, point), (None,) * len(names))
 
@@ -92,5 +92,5 @@ def about_origin(force: np.ndarray, torque: np.ndarray, point: np.ndarray) -> np
     """
     arm = np.cross(point, force)
     horizontal = [0, 2]
-    of_point, of_origin = (np.square(each[..., horizontal]).sum(axis=(0, 2)) for each in (torque, torque - arm))
+    of_point, of_origin = (np.square(moment[..., horizontal]).sum(axis=(0, 2)) for moment in (torque, torque - arm))
     return torque + np.where((of_point <= of_origin)[:, None], arm, 0.0)

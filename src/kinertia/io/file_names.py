@@ -24,9 +24,9 @@ def fits_everywhere(name: str) -> bool:
     return bool(name) and not _FORBIDDEN.search(name) and not _DEVICES.fullmatch(name.partition(".")[0])
 
 
-def same_folder(one: str, other: str) -> bool:
+def same_folder(folder: str, other: str) -> bool:
     """Return whether two names are the same folder on some system: Windows and macOS ignore case."""
-    return same_name_key(one) == same_name_key(other)
+    return same_name_key(folder) == same_name_key(other)
 
 
 def same_name_key(name: str) -> str:
@@ -79,8 +79,8 @@ def missing_file(path: Path, written: str, expected: str = "", is_folder: bool =
     """
     folder = path.parent.absolute()
     exists = os.path.isdir(folder)
-    beside = [one for one in folder.iterdir() if one.is_dir() or not is_folder] if exists else []
-    names = {one.name.lower(): one.name for one in beside if one.name[0] != "."}
+    beside = [entry for entry in folder.iterdir() if entry.is_dir() or not is_folder] if exists else []
+    names = {entry.name.lower(): entry.name for entry in beside if entry.name[0] != "."}
     nearest = [names[near] for near in get_close_matches(path.name.lower(), sorted(names), n=3, cutoff=0.4)]
     hint = "nothing there has a similar name" if exists else "that folder does not exist"
     if nearest:

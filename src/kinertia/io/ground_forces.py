@@ -141,8 +141,10 @@ def _stated(table: TimeTable, groups: Sequence[_Columns], turn: FloatArray) -> l
     zero = np.zeros((len(table.time), 3))
     identifiers = ((group.force, group.point, group.torque) for group in groups)
     return [
-        np.stack([zero if one is None else _triple(table, one) @ turn.T for one in own], axis=1)
-        for own in zip(*identifiers, strict=True)
+        np.stack(
+            [zero if identifier is None else _triple(table, identifier) @ turn.T for identifier in of_quantity], axis=1
+        )
+        for of_quantity in zip(*identifiers, strict=True)
     ]
 
 
@@ -278,9 +280,9 @@ def _expect_own_columns(groups: Sequence[_Columns], path: Path) -> None:
 def _expect_different(groups: Sequence[_Columns], table: TimeTable, path: Path) -> None:
     """Raise FileError where two plates have the same force in every row, as where it is given by plate and by foot."""
     loaded = [(group, force) for group in groups if (force := _triple(table, group.force)).any()]
-    for (one, force), (other, same) in combinations(loaded, 2):
+    for (load, force), (other, same) in combinations(loaded, 2):
         if np.array_equal(force, same):
-            both = {"load": Quantity(f"the force of {other.name}"), "other": Quantity(f"the force of {one.name}")}
+            both = {"load": Quantity(f"the force of {other.name}"), "other": Quantity(f"the force of {load.name}")}
             raise FileError.found(path, "F144", **both, identifier=Quantity(other.force))
 
 
@@ -319,10 +321,12 @@ def torque_columns(force: FloatArray, point: FloatArray, torque: FloatArray) -> 
         if rows.sum() < _FEWEST:
             columns.append(TorqueColumns(np.nan, (0.0, 0.0, 0.0), None))
             continue
-        own = torque[rows, p]
+        plate_torque = torque[rows, p]
         moves = float(np.ptp(point[rows, p][:, [0, 2]], axis=0).max()) > _MOVES_M
-        arm = float(np.median(np.hypot(own[:, 0], own[:, 2]) / force[rows, p, 1])) if moves else np.nan
-        x, y, z = (rms(values) for values in own.T)
+        arm = (
+            float(np.median(np.hypot(plate_torque[:, 0], plate_torque[:, 2]) / force[rows, p, 1])) if moves else np.nan
+        )
+        x, y, z = (rms(values) for values in plate_torque.T)
         columns.append(TorqueColumns(arm, (x, y, z), elsewhere.get(p), float(np.median(point[rows, p, 1]))))
     return tuple(columns)
 
@@ -336,8 +340,8 @@ def exchanged_torques(vertical: FloatArray, torque: FloatArray) -> dict[int, int
     pairs: dict[int, int] = {}
     for a, b in combinations(range(vertical.shape[1]), 2):
         only_a, only_b = (
-            (vertical[:, own] > FIRM_LOAD_N) & (vertical[:, other] < LOAD_THRESHOLD_N)
-            for own, other in ((a, b), (b, a))
+            (vertical[:, loaded] > FIRM_LOAD_N) & (vertical[:, other] < LOAD_THRESHOLD_N)
+            for loaded, other in ((a, b), (b, a))
         )
         if min(only_a.sum(), only_b.sum()) < _FEWEST_ALONE:
             continue

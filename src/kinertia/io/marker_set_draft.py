@@ -97,7 +97,9 @@ def place_markers(recording: Recording) -> Placement:
         return result
     pairs, moves = sides(recording.markers.labels), speed_m_s(markers) > STILL_M_S
     postures = _frames(markers) if moves else [np.nanmedian(markers.positions, axis=0)]
-    body, found, margin = max((_best_body(markers.labels, each, computed, pairs) for each in postures), key=_score)
+    body, found, margin = max(
+        (_best_body(markers.labels, posture, computed, pairs) for posture in postures), key=_score
+    )
     if found.score < _SURE:
         result.notes.append("no one stands upright here, so only the labels were used: give the static trial")
         return result
@@ -125,18 +127,21 @@ def _best_body(
     fit better than the opposite heading.
     """
     shown = np.asarray(np.isfinite(points).all(axis=1))
-    labels, points = tuple(label for label, one in zip(labels, shown, strict=True) if one), points[shown]
+    labels, points = tuple(label for label, is_shown in zip(labels, shown, strict=True) if is_shown), points[shown]
     meant = tuple(roles(label, label in pairs) for label in labels)
     worn = np.array([label not in computed for label in labels])
-    trust = np.where(worn, 0.0, np.where([bool(one) for one in meant], _COMPUTED, -np.inf))
+    trust = np.where(worn, 0.0, np.where([bool(meanings) for meanings in meant], _COMPUTED, -np.inf))
     axes = body_axes(points[worn])
-    others = tuple(labels.index(pairs[one][1]) if one in pairs and pairs[one][1] in labels else -1 for one in labels)
+    others = tuple(
+        labels.index(pairs[label][1]) if label in pairs and pairs[label][1] in labels else -1 for label in labels
+    )
     fits = []
-    for one in (axes, axes.turned()):
-        places = one.places(points)
+    for turned_axes in (axes, axes.turned()):
+        places = turned_axes.places(points)
         side, mirrored = _label_sides(labels, places, pairs)
         bodies = [
-            StandingBody(labels, places, float(each), meant, trust, side, others, mirrored) for each in _STATURES_M
+            StandingBody(labels, places, float(stature_m), meant, trust, side, others, mirrored)
+            for stature_m in _STATURES_M
         ]
         fits.append(max(((body, find_legs(body)) for body in bodies), key=_score))
     best = max(fits, key=_score)
@@ -154,9 +159,11 @@ def _label_sides(
     """Return the side stated by each label, and whether most labels contradict their positions."""
     across = {label: place[2] for label, place in zip(labels, places, strict=True)}
     apart = [
-        across[one] - across[two] for one, (side, two) in pairs.items() if side == "r" and {one, two} <= set(across)
+        across[label] - across[two]
+        for label, (side, two) in pairs.items()
+        if side == "r" and {label, two} <= set(across)
     ]
-    mirrored = sum(np.sign(each) for each in apart if abs(each) > _APART_M) < 0
+    mirrored = sum(np.sign(apart_m) for apart_m in apart if abs(apart_m) > _APART_M) < 0
     return tuple(pairs[label][0] if label in pairs else "" for label in labels), bool(mirrored)
 
 
@@ -176,16 +183,18 @@ def _explain(result: Placement, body: StandingBody, found: Found, computed: Mapp
     for side in "rl":
         heads, which = metatarsals(found.markers, side)
         wrist = [found.markers[name] for name in (f"wrist_{side}", f"wrist_other_{side}") if name in found.markers]
-        of_landmark |= {name: own for name, own in ((f"metatarsal_{side}", heads), (f"wrist_{side}", wrist)) if own}
+        of_landmark |= {
+            name: markers for name, markers in ((f"metatarsal_{side}", heads), (f"wrist_{side}", wrist)) if markers
+        }
         if heads:
             result.how[f"metatarsal_{side}"] = which
     members = segment_members(body, found)
     of_landmark |= wands(body, found, members)
     how = {}
-    for landmark, own in of_landmark.items():
-        name = _on_side(body, landmark, own)
-        result.landmarks[name] = [body.labels[k] for k in own]
-        how[name] = "; ".join(filter(None, (result.how.get(landmark), _how(body, landmark, own, computed))))
+    for landmark, markers in of_landmark.items():
+        name = _on_side(body, landmark, markers)
+        result.landmarks[name] = [body.labels[k] for k in markers]
+        how[name] = "; ".join(filter(None, (result.how.get(landmark), _how(body, landmark, markers, computed))))
     result.how.clear()
     result.how.update(how)
     for marker, segment in members.items():
@@ -197,22 +206,22 @@ def _explain(result: Placement, body: StandingBody, found: Found, computed: Mapp
 
 def _complete_by_label(result: Placement, pairs: Mapping[str, tuple[str, str]]) -> None:
     """Add to the other side what was found on one side only, if its markers have counterparts by label."""
-    placed = {label for own in (*result.landmarks.values(), *result.segments.values()) for label in own}
+    placed = {label for labels in (*result.landmarks.values(), *result.segments.values()) for label in labels}
 
-    def counterparts(own: Sequence[str]) -> list[str]:
-        there = [pairs[label][1] for label in own if label in pairs]
+    def counterparts(labels: Sequence[str]) -> list[str]:
+        there = [pairs[label][1] for label in labels if label in pairs]
         return [label for label in there if label not in placed and label not in result.left_out]
 
-    for name, own in list(result.landmarks.items()):
+    for name, labels in list(result.landmarks.items()):
         base, _, side = name.rpartition("_")
         other = f"{base}_{_OPPOSITE.get(side)}"
-        there = counterparts(own)
-        if side in _OPPOSITE and other not in result.landmarks and len(there) == len(own):
+        there = counterparts(labels)
+        if side in _OPPOSITE and other not in result.landmarks and len(there) == len(labels):
             result.landmarks[other] = there
             result.how[other] = "as on the other side, going by its label"
-    for name, own in list(result.segments.items()):
+    for name, labels in list(result.segments.items()):
         base, _, side = name.rpartition("_")
-        if side in _OPPOSITE and (there := counterparts(own)):
+        if side in _OPPOSITE and (there := counterparts(labels)):
             result.segments.setdefault(f"{base}_{_OPPOSITE[side]}", []).extend(there)
 
 
@@ -278,7 +287,7 @@ def draft_marker_set(recording: Recording, name: str) -> MarkerSetDraft:
     landmarks, segments = placed.landmarks, placed.segments
     widths = _widths(landmarks, recording)
     against = _against(recording, landmarks, widths)
-    notes = [*placed.notes, *(f"this cannot be right: {one}" for one in against)]
+    notes = [*placed.notes, *(f"this cannot be right: {reason}" for reason in against)]
     heading = [
         "# Drafted by kinertia markers: check every line, complete those marked FILL IN, and name the file with",
         "# --markers or under [model] markers.",
@@ -287,21 +296,23 @@ def draft_marker_set(recording: Recording, name: str) -> MarkerSetDraft:
     text = marker_set_text(name, landmarks, segments, widths, labels, "\n".join(heading), placed.how)
     out = [f"#   {label}: {reason}" for label, reason in placed.left_out.items()]
     text += "\n".join(["", "# Not markers on the skin:", *out, ""] if out else [])
-    needed = [f"{one}_{side}" for one in _LEG for side in "rl"]
+    needed = [f"{landmark}_{side}" for landmark in _LEG for side in "rl"]
     if "sacrum" not in landmarks:
         needed += ["psis_r", "psis_l"]
-    return MarkerSetDraft(text, tuple(one for one in needed if one not in landmarks), tuple(notes), against)
+    return MarkerSetDraft(
+        text, tuple(landmark for landmark in needed if landmark not in landmarks), tuple(notes), against
+    )
 
 
 def _against(
     recording: Recording, landmarks: Mapping[str, Sequence[str]], widths: Mapping[str, str]
 ) -> tuple[str, ...]:
     """List what no person has in legs with these landmarks, with any joint widths; nothing where some are missing."""
-    found = MarkerSet("draft", {name: tuple(own) for name, own in landmarks.items()}, {}, dict(widths))
+    found = MarkerSet("draft", {name: tuple(labels) for name, labels in landmarks.items()}, {}, dict(widths))
     known = dict.fromkeys(widths.values(), _ANY_WIDTH_M) | recording.measurements
     try:
         marks = find_landmarks(replace(recording, measurements=known), found)
-        return tuple(one.sentence for one in departures(marks))
+        return tuple(departure.sentence for departure in departures(marks))
     except MarkerSetError:
         return ()
 
@@ -313,7 +324,7 @@ def _widths(landmarks: Mapping[str, Sequence[str]], recording: Recording) -> dic
         base, _, side = joint.rpartition("_")
         if f"{base}_lateral_{side}" in landmarks and f"{base}_medial_{side}" not in landmarks:
             name = f"{side.upper()}{base.capitalize()}Width"
-            known = {one.lower(): one for one in recording.measurements}
+            known = {measurement.lower(): measurement for measurement in recording.measurements}
             if base != "elbow" or name.lower() in known:  # elbows have a width by the stature
                 widths[joint] = known.get(name.lower(), name)
     return widths
@@ -347,21 +358,21 @@ def marker_set_text(
     """Return the text of a marker set (TOML); labels and entries that it lacks are in comments."""
     lines = [heading, f"name = {quoted(name)}", "", "[landmarks]"]
     for landmark in LANDMARKS:
-        own = landmarks.get(landmark)
-        if own:
+        landmark_labels = landmarks.get(landmark)
+        if landmark_labels:
             reason = "" if how is None or landmark not in how else f"  # {how[landmark]}"
-            lines.append(f"{landmark} = {_listed(own)}{reason}")
+            lines.append(f"{landmark} = {_listed(landmark_labels)}{reason}")
         elif landmark in _NEEDED:
             lines.append(f'# {landmark} = ""  # FILL IN, if there is one')
     lines += ["", "[segments]"]
     for segment in SEGMENTS:
-        if own := segments.get(segment):
-            lines.append(f"{segment} = {_listed(own)}")
+        if landmark_labels := segments.get(segment):
+            lines.append(f"{segment} = {_listed(landmark_labels)}")
         else:
             lines.append(f"# {segment} = []  # FILL IN")
     if widths:
         lines += ["", _WIDTHS, "[widths]", *(f"{joint} = {quoted(width)}" for joint, width in widths.items())]
-    placed = {label for own in segments.values() for label in own}
+    placed = {label for segment_labels in segments.values() for label in segment_labels}
     rest = [label for label in labels if label not in placed]
     if rest:
         lines += ["", f"# Not placed; FILL IN where they belong: {', '.join(rest)}"]
@@ -379,9 +390,11 @@ def _names(table: str, labels: Sequence[str]) -> Iterator[tuple[str, str]]:
     presets = map(read_marker_set, preset_names())
     for preset in sorted(presets, key=lambda preset: (label_share(preset, labels), len(preset.labels))):
         entries = preset.landmarks if table == "landmarks" else preset.segments
-        for entry, own in entries.items():
+        for entry, entry_labels in entries.items():
             # a landmark of several labels is their middle, none of them alone
-            yield from ((folded(label), entry) for label in own if table == "segments" or len(own) == 1)
+            yield from (
+                (folded(label), entry) for label in entry_labels if table == "segments" or len(entry_labels) == 1
+            )
 
 
 def _placed(labels: Sequence[str], names: Mapping[str, str], single: bool) -> dict[str, list[str]]:

@@ -100,12 +100,16 @@ def nearest_preset(labels: Sequence[str]) -> MarkerSet:
     presets = [with_posterior_pelvis(preset, labels) for preset in read]
     spelled = [with_posterior_pelvis(spelled_as(preset, labels), labels) for preset in read]
 
-    def worn(one: MarkerSet) -> int:
-        return len(set(one.labels) & set(labels)) if fits_person(one, labels) else 0
+    def worn(preset: MarkerSet) -> int:
+        return len(set(preset.labels) & set(labels)) if fits_person(preset, labels) else 0
 
     def nearness(k: int) -> tuple[float, ...]:
         both = presets[k], spelled[k]
-        return *(worn(one) for one in both), *(label_share(one, labels) for one in both), len(presets[k].labels)
+        return (
+            *(worn(candidate) for candidate in both),
+            *(label_share(candidate, labels) for candidate in both),
+            len(presets[k].labels),
+        )
 
     best = max(range(len(presets)), key=nearness)
     return spelled[best] if fits_person(spelled[best], labels) else presets[best]

@@ -83,7 +83,7 @@ def _wrong(path: Path, line: int | None, problem: str, **evidence: Quantity) -> 
 
 def _norm(curve: Mapping[float, Sequence[float]], rows: Sequence[Row]) -> Norm:
     percent, last = sorted(curve), rows[-1]
-    mean, sd = np.array([curve[one] for one in percent]).T
+    mean, sd = np.array([curve[key] for key in percent]).T
     convention = last.cells.get("convention", "")
     counts = [int(row.number("n")) for row in rows if convention and row.cells.get("n")]
     spans = (_span(last, name) if convention else None for name in _SPANS)

@@ -204,10 +204,10 @@ def updated_files(folder: Path, kind: str, optional: Collection[str]) -> Iterato
         new.mkdir()
         yield new
         names, listed = _files(new), _written(folder)
-        own = set(listed.get(kind, ()))
-        gone = own & set(optional) - names
+        listed_names = set(listed.get(kind, ()))
+        gone = listed_names & set(optional) - names
         if listed or names & set(optional):
-            text = json.dumps({**listed, kind: sorted((own | names) - gone)}, indent=1) + "\n"
+            text = json.dumps({**listed, kind: sorted((listed_names | names) - gone)}, indent=1) + "\n"
             (new / _WRITTEN).write_text(text, encoding="utf-8")
         with _uninterrupted():
             for name in sorted(_files(new)):
@@ -223,8 +223,11 @@ def _replace(new: Path, folder: Path, kind: str, aside: Path) -> None:
     written[kind] = sorted(_files(new) - others - {_WRITTEN})
     listed = _written(folder)
     _expect_nothing_of_others(folder, _files(new), listed)
-    old = {name for one in written for name in listed.get(one, ())} | {_WRITTEN}
-    everything = {**{one: names for one, names in listed.items() if one not in written}, **written}
+    old = {name for written_kind in written for name in listed.get(written_kind, ())} | {_WRITTEN}
+    everything = {
+        **{written_kind: names for written_kind, names in listed.items() if written_kind not in written},
+        **written,
+    }
     (new / _WRITTEN).write_text(json.dumps(everything, indent=1) + "\n", encoding="utf-8")
     try:
         staying = _files(folder) - old - _files(new)
@@ -275,7 +278,7 @@ def _files(folder: Path) -> set[str]:
     return {
         (Path(place) / name).relative_to(folder).as_posix()
         for place, folders, names in os.walk(folder)
-        for name in (*names, *(one for one in folders if (Path(place) / one).is_symlink()))
+        for name in (*names, *(linked for linked in folders if (Path(place) / linked).is_symlink()))
     }
 
 
@@ -341,12 +344,12 @@ def put_in_place(new: Path, folder: Path, aside: Path) -> Path:
     return aside
 
 
-def _exchanged(one: Path, other: Path) -> bool:
+def _exchanged(path: Path, other: Path) -> bool:
     """Exchange the two folders; return whether the system could."""
     if sys.platform == "win32":
         return False
     system = ctypes.CDLL(None)
-    first, second = os.fsencode(one), os.fsencode(other)
+    first, second = os.fsencode(path), os.fsencode(other)
     try:
         if sys.platform == "darwin":
             return bool(system.renamex_np(first, second, _EXCHANGE) == 0)

@@ -96,7 +96,7 @@ def _forces(
 
 def _of_markers(recording: Recording) -> list[Finding]:
     """Return findings without those about the markers file's own plates, where plates of a force file replace them."""
-    return [one for one in recording.findings if one.code != "F151" and one.where.plate is None]
+    return [reported for reported in recording.findings if reported.code != "F151" and reported.where.plate is None]
 
 
 def _read_markers(path: Path, plate: Path | None, length_unit: str | None, standing: bool) -> Recording:

@@ -96,8 +96,8 @@ def _downloaded(name: str, folder: Path, share: "_Share") -> _Failure | None:
     server = urlsplit(URL).netloc
     pooch.get_logger().setLevel("WARNING")  # it announces every file otherwise
     try:
-        one = pooch.create(folder, URL, registry={name: f"sha256:{SHA256[name]}"})
-        one.fetch(name, downloader=pooch.HTTPDownloader(progressbar=share, timeout=_TIMEOUT_S))
+        registry = pooch.create(folder, URL, registry={name: f"sha256:{SHA256[name]}"})
+        registry.fetch(name, downloader=pooch.HTTPDownloader(progressbar=share, timeout=_TIMEOUT_S))
     except requests.HTTPError as error:
         status = "" if error.response is None else error.response.status_code
         return _Failure(f"{server} answered {status} for {name}", "try again later")

@@ -80,15 +80,15 @@ def model_segments(
     bodies: dict[str, tuple[str, ...]] = {}
     tables = []
     for segment in SEGMENTS:
-        own = [i for i, body in enumerate(bsp.segments) if segment_of(body) == segment and body in place]
-        if not own or not bsp.mass_kg[own].sum() > 0:
+        rows = [i for i, body in enumerate(bsp.segments) if segment_of(body) == segment and body in place]
+        if not rows or not bsp.mass_kg[rows].sum() > 0:
             continue
-        bodies[segment] = tuple(bsp.segments[i] for i in own if masses[bsp.segments[i]] > 0)
-        turns, origins = (np.array([place[bsp.segments[i]][k] for i in own]) for k in (0, 1))
+        bodies[segment] = tuple(bsp.segments[i] for i in rows if masses[bsp.segments[i]] > 0)
+        turns, origins = (np.array([place[bsp.segments[i]][k] for i in rows]) for k in (0, 1))
         mass, com, inertia = combine(
-            bsp.mass_kg[own],
-            origins + np.einsum("bij,bj->bi", turns, bsp.com_m[own]),
-            turns @ bsp.inertia_kgm2[own] @ turns.transpose(0, 2, 1),
+            bsp.mass_kg[rows],
+            origins + np.einsum("bij,bj->bi", turns, bsp.com_m[rows]),
+            turns @ bsp.inertia_kgm2[rows] @ turns.transpose(0, 2, 1),
         )
         rotation, origin = _segment_frame(segment, place[main.get(segment, bodies[segment][0])], centres)
         tables.append((mass, rotation.T @ (com - origin), rotation.T @ inertia @ rotation))

@@ -177,10 +177,10 @@ def literature_bsp(
     mass_scale = mass_kg / sum(part.row.mass for part in parts)
     bodies = []
     for segment in SEGMENTS:
-        own = [part for part in parts if part.segment == segment]
-        mass = np.array([mass_scale * part.row.mass for part in own])
-        com = [part.origin_m + part.row.com * part.length_m for part in own]
-        inertia = [m * part.length_m**2 * part.row.gyration for m, part in zip(mass, own, strict=True)]
+        of_segment = [part for part in parts if part.segment == segment]
+        mass = np.array([mass_scale * part.row.mass for part in of_segment])
+        com = [part.origin_m + part.row.com * part.length_m for part in of_segment]
+        inertia = [m * part.length_m**2 * part.row.gyration for m, part in zip(mass, of_segment, strict=True)]
         bodies.append(combine(mass, com, inertia))
     right = BodySegmentParameters(SEGMENTS, *(np.array(values) for values in zip(*bodies, strict=True)))
     left = np.array([segment.endswith("_l") for segment in SEGMENTS])

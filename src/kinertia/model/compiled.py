@@ -94,8 +94,8 @@ def is_stored(value: Any, module: str) -> bool:
     """Return whether a value is a function of this module whose machine code is stored."""
     from numba.core.registry import CPUDispatcher
 
-    own = isinstance(value, CPUDispatcher) and value.__module__ == module
-    return own and not value.targetoptions.get("no_cpython_wrapper")
+    defined_here = isinstance(value, CPUDispatcher) and value.__module__ == module
+    return defined_here and not value.targetoptions.get("no_cpython_wrapper")
 
 
 def _compiled(function: F, **options: Any) -> F:

@@ -164,11 +164,11 @@ class Bounds:
     @classmethod
     def of(cls, coordinates: Sequence[str], ranges: Mapping[str, Range]) -> Self:
         """Collect the ranges of these coordinates, in this order."""
-        own = [ranges.get(name, UNKNOWN) for name in coordinates]
-        known = [one.anatomical(name) for one, name in zip(own, coordinates, strict=True)]
-        ends = np.array([_ends(*each) for each in zip(own, known, strict=True)]).reshape(-1, 6)
+        stated = [ranges.get(name, UNKNOWN) for name in coordinates]
+        known = [stated_range.anatomical(name) for stated_range, name in zip(stated, coordinates, strict=True)]
+        ends = np.array([_ends(*pair) for pair in zip(stated, known, strict=True)]).reshape(-1, 6)
         low, high, low_sd, high_sd, least, most = ends.T
-        anatomical = np.array([one is not None for one in known], dtype=bool)
+        anatomical = np.array([motion_range is not None for motion_range in known], dtype=bool)
         return cls(low, high, low_sd, high_sd, least, most, anatomical)
 
     @cached_property
@@ -201,12 +201,12 @@ class Bounds:
         return ((q <= self.least) & (pull < 0)) | ((q >= self.most) & (pull > 0))
 
 
-def _ends(own: Range, known: RangeOfMotion | None) -> tuple[float, float, float, float, float, float]:
+def _ends(stated: Range, known: RangeOfMotion | None) -> tuple[float, float, float, float, float, float]:
     """Return low and high, their SDs, and the clamped ends, in the order of `Bounds`."""
-    least, most = (own.low, own.high) if own.clamped else (-np.inf, np.inf)
+    least, most = (stated.low, stated.high) if stated.clamped else (-np.inf, np.inf)
     if known is None:
-        sd = CLAMPED_SD if own.clamped else SD
-        return own.low, own.high, sd, sd, least, most
+        sd = CLAMPED_SD if stated.clamped else SD
+        return stated.low, stated.high, sd, sd, least, most
     low_sd, high_sd = known.beyond_sd
     low, low_sd = (least, CLAMPED_SD) if least >= known.low else (known.low, low_sd)
     high, high_sd = (most, CLAMPED_SD) if most <= known.high else (known.high, high_sd)

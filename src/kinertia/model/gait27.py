@@ -145,7 +145,9 @@ def _expect_axes(marks: jc.Landmarks, joints: Sequence[Joint]) -> None:
 def _landmarks_of(marks: jc.Landmarks, joint: Joint) -> str:
     """Return the landmarks whose labels are on the two segments of a joint."""
     labels = {label for name in (joint.parent, joint.child) for label in marks.marker_set.segments.get(name, ())}
-    return ", ".join(name for name, own in marks.marker_set.landmarks.items() if labels & set(own))
+    return ", ".join(
+        name for name, landmark_labels in marks.marker_set.landmarks.items() if labels & set(landmark_labels)
+    )
 
 
 def _ranges(joints: list[Joint]) -> dict[str, Range]:
@@ -174,8 +176,8 @@ def _gimbal(prefix: str, names: list[str], suffix: str = "", side: str = "r") ->
 
 def _offsets(names: tuple[str, ...], side: str = "") -> tuple[Axis, ...]:
     """Return three translations that move a joint centre in its parent, for calibration."""
-    own = [name for name in names if name.endswith(side)]
-    return tuple(Axis(name, "translation", d) for name, d in zip(own, (_X, _Y, _Z), strict=True))
+    of_side = [name for name in names if name.endswith(side)]
+    return tuple(Axis(name, "translation", d) for name, d in zip(of_side, (_X, _Y, _Z), strict=True))
 
 
 def _turn(axis: np.ndarray, angle: float) -> np.ndarray:

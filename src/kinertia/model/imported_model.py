@@ -198,9 +198,9 @@ def mirrored(axis: int) -> FloatArray:
     return reflection
 
 
-def angle_deg(one: FloatArray, other: FloatArray) -> float:
+def angle_deg(axis: FloatArray, other: FloatArray) -> float:
     """Return the angle between two lines of these directions (unit): an axis and its opposite are the same line."""
-    return float(np.degrees(np.arccos(min(1.0, abs(float(one @ other))))))
+    return float(np.degrees(np.arccos(min(1.0, abs(float(axis @ other))))))
 
 
 def centre_offsets(skeleton: Skeleton) -> dict[str, np.ndarray]:

@@ -102,9 +102,14 @@ class MarkerSet:
         """Return the set without these labels, and without the landmarks that need one of them."""
         return replace(
             self,
-            landmarks={name: own for name, own in self.landmarks.items() if not set(own) & set(labels)},
+            landmarks={
+                name: labels_of_landmark
+                for name, labels_of_landmark in self.landmarks.items()
+                if not set(labels_of_landmark) & set(labels)
+            },
             segments={
-                name: tuple(label for label in own if label not in labels) for name, own in self.segments.items()
+                name: tuple(label for label in labels_of_segment if label not in labels)
+                for name, labels_of_segment in self.segments.items()
             },
         )
 
@@ -131,7 +136,7 @@ def spelled_as(marker_set: MarkerSet, labels: Sequence[str]) -> MarkerSet:
         return marker_set
 
     def respelled(entries: Mapping[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
-        return {name: tuple(spelled.get(one, one) for one in each) for name, each in entries.items()}
+        return {name: tuple(spelled.get(label, label) for label in entry) for name, entry in entries.items()}
 
     return replace(
         marker_set,
@@ -145,8 +150,8 @@ def spellings(wanted: Sequence[str], labels: Sequence[str]) -> dict[str, str]:
     """Map each wanted label that is not among these to the one that differs in capitals or punctuation only, or by a
     person's name before all labels of either.
     """
-    own = shared_prefix(wanted)
-    names = {one: {folded(one), folded(one.removeprefix(own))} for one in wanted if one not in labels}
+    prefix = shared_prefix(wanted)
+    names = {label: {folded(label), folded(label.removeprefix(prefix))} for label in wanted if label not in labels}
     return _matched(names, [label for label in labels if label not in wanted], shared_prefix(labels))
 
 
@@ -157,7 +162,7 @@ def shared_prefix(labels: Sequence[str]) -> str:
     'S_01-'
     """
     parts = Counter(label[: sep.end()] for label in labels for sep in _PREFIX_END.finditer(label))
-    return max((one for one, count in parts.items() if count >= _PREFIX_SHARE * len(labels)), key=len, default="")
+    return max((prefix for prefix, count in parts.items() if count >= _PREFIX_SHARE * len(labels)), key=len, default="")
 
 
 def _matched(names: Mapping[str, set[str]], labels: Sequence[str], prefix: str) -> dict[str, str]:
@@ -165,12 +170,20 @@ def _matched(names: Mapping[str, set[str]], labels: Sequence[str], prefix: str) 
     and not claimed twice.
     """
     known: dict[str, list[str]] = {}
-    for one in labels:
-        for form in {folded(one), folded(one.removeprefix(prefix))}:
-            known.setdefault(form, []).append(one)
-    fitting = {label: {one for form in own for one in known.get(form, ())} for label, own in names.items()}
-    claims = Counter(one for found in fitting.values() for one in found)
-    return {label: one for label, found in fitting.items() if len(found) == 1 for one in found if claims[one] == 1}
+    for candidate in labels:
+        for form in {folded(candidate), folded(candidate.removeprefix(prefix))}:
+            known.setdefault(form, []).append(candidate)
+    fitting = {
+        label: {candidate for form in forms for candidate in known.get(form, ())} for label, forms in names.items()
+    }
+    claims = Counter(candidate for found in fitting.values() for candidate in found)
+    return {
+        label: candidate
+        for label, found in fitting.items()
+        if len(found) == 1
+        for candidate in found
+        if claims[candidate] == 1
+    }
 
 
 def with_posterior_pelvis(marker_set: MarkerSet, labels: Sequence[str]) -> MarkerSet:
@@ -233,12 +246,19 @@ def fits_person(marker_set: MarkerSet, labels: Sequence[str]) -> bool:
     The marker sets of two laboratories may share most labels but not these.
     """
     sides = [[label for side in "rl" for label in marker_set.landmarks.get(f"{name}_{side}", ())] for name in _FOOT]
-    return matches_labels(marker_set, labels) and all(set(own) & set(labels) for own in sides if own)
+    return matches_labels(marker_set, labels) and all(
+        set(labels_of_side) & set(labels) for labels_of_side in sides if labels_of_side
+    )
 
 
 def _leg_label_share(marker_set: MarkerSet, labels: Sequence[str]) -> float:
     """Return the share of the labels of pelvis, legs and feet that are among these."""
-    legs = {label for name, own in marker_set.segments.items() if name.startswith(_LEGS) for label in own}
+    legs = {
+        label
+        for name, labels_of_segment in marker_set.segments.items()
+        if name.startswith(_LEGS)
+        for label in labels_of_segment
+    }
     return len(legs & set(labels)) / max(len(legs), 1)
 
 

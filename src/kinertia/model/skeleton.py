@@ -294,8 +294,8 @@ class Skeleton:
             if part is not None:
                 rows = np.array([self.segments.index(segment) for segment in part.segments])
                 last_axis = self.tree.last_axis[rows]
-                own = (self._parameter_places[rows] @ part.dynamic_parameters().reshape(-1, 10, 1))[..., 0]
-                np.add.at(total, last_axis[last_axis >= 0], own[last_axis >= 0])
+                of_part = (self._parameter_places[rows] @ part.dynamic_parameters().reshape(-1, 10, 1))[..., 0]
+                np.add.at(total, last_axis[last_axis >= 0], of_part[last_axis >= 0])
         return total
 
     @cached_property

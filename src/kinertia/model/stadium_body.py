@@ -107,7 +107,7 @@ def stadium_bsp(
         "upper_arm_r": _downwards(_dense(person.A1.solids, ("upper_arm",) * 2, density_kg_m3)),
         "forearm_r": _downwards(_dense(person.A2.solids, _FOREARM, density_kg_m3)),
     }
-    mass, com, inertia = (np.array(each) for each in zip(*(stacks[kind] for kind in KINDS), strict=True))
+    mass, com, inertia = (np.array(stack) for stack in zip(*(stacks[kind] for kind in KINDS), strict=True))
     axes = np.array([_POINTED if kind == "foot_r" else _UPRIGHT for kind in KINDS])
     return BodySegmentParameters(
         KINDS, mass, np.einsum("sij,sj->si", axes, com), axes @ inertia @ axes.transpose(0, 2, 1)
@@ -123,7 +123,7 @@ def _person(measures_m: tuple[float, ...]) -> Any:
     expect_yeadon()
     from yeadon import Human
 
-    both = {key: value for one, value in zip(measures(), measures_m, strict=True) for key in one.keys}
+    both = {key: value for measure, value in zip(measures(), measures_m, strict=True) for key in measure.keys}
     with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return Human(both)
@@ -254,7 +254,7 @@ def log_size(mass_kg: float, height_m: float) -> FloatArray:
 
     It is the stature, or the square root of mass over stature.
     """
-    along = np.array([one.kind == "length" for one in measures()])
+    along = np.array([measure.kind == "length" for measure in measures()])
     size: FloatArray = np.where(along, np.log(height_m), 0.5 * np.log(mass_kg / height_m))
     return size
 
@@ -264,7 +264,7 @@ def usual_build() -> UsualBuild:
     """Return the build fitted to the five people that come with the package `yeadon` (four men, a woman)."""
     rows = {row["name"]: row for row in _rows("usual_build.csv")}
     columns = {
-        column: np.array([float(rows[one.name][column]) for one in measures()])
+        column: np.array([float(rows[measure.name][column]) for measure in measures()])
         for column in next(iter(rows.values()))
         if column != "name"
     }

@@ -89,11 +89,11 @@ def departures(marks: jc.Landmarks) -> Iterator[Departure]:
     Raises:
         MarkerSetError: a landmark is missing.
     """
-    for joint, (limit, own) in _rotations(marks).items():
-        apart = own["r"] - own["l"]
-        far = [side for side in "rl" if abs(own[side] - limit.centre) > limit.within]
+    for joint, (limit, rotation_rad) in _rotations(marks).items():
+        apart = rotation_rad["r"] - rotation_rad["l"]
+        far = [side for side in "rl" if abs(rotation_rad[side] - limit.centre) > limit.within]
         for side in far:
-            yield Departure(f"{joint}_{side}", own[side], False, limit)
+            yield Departure(f"{joint}_{side}", rotation_rad[side], False, limit)
         if not far and abs(apart) > limit.apart:
             yield Departure(joint, apart, True, limit)
 
@@ -107,8 +107,8 @@ def _rotations(marks: jc.Landmarks) -> dict[str, tuple[LegLimit, dict[str, float
         for side in "rl":
             leg = jc.leg_frames(marks, origin + pelvis @ jc.hip_in_pelvis(width, depth, "bell", side), side)
             axes = ((leg.knee_axis, upright), (leg.ankle_axis, leg.foot), (leg.foot[:, 2], upright))
-            for (_, own), (axis, reference) in zip(found.values(), axes, strict=True):
-                own[side] = jc.rotation_outwards(axis, reference, side)
+            for (_, rotation_rad), (axis, reference) in zip(found.values(), axes, strict=True):
+                rotation_rad[side] = jc.rotation_outwards(axis, reference, side)
     return found
 
 
@@ -213,20 +213,20 @@ def _devices(labels: Iterable[str]) -> dict[str, tuple[str, str, str]]:
     for label in labels:
         if match := _DEVICE.fullmatch(label):
             found.setdefault(match["before"] + match["side"], {})[match["part"].upper()] = label
-    return {side: (own[_AXIS], own["D1"], own["D2"]) for side, own in found.items() if len(own) == 3}
+    return {side: (parts[_AXIS], parts["D1"], parts["D2"]) for side, parts in found.items() if len(parts) == 3}
 
 
 def with_knees_of_device(recording: Recording, file: str) -> Recording:
     """Return the recording with the knee markers that a device stands for and the file lacks, and F166 for them."""
     markers = recording.markers
     devices = _devices(markers.labels)
-    used = {label for own in devices.values() for label in own}
+    used = {label for device in devices.values() for label in device}
     others = [label for label in markers.labels if label not in used]
     added: dict[str, FloatArray] = {}
-    for side, own in devices.items():
-        label = _like(f"{side}k{_KNEE}", own[0])
+    for side, device in devices.items():
+        label = _like(f"{side}k{_KNEE}", device[0])
         if label not in markers.labels and others:
-            corner = _corner(markers.select(own).positions, markers.select(others).positions)
+            corner = _corner(markers.select(device).positions, markers.select(others).positions)
             added |= {} if corner is None else {label: corner}
     if not added:
         return recording
@@ -268,10 +268,10 @@ def with_alignment_device(marker_set: MarkerSet, labels: Iterable[str]) -> Marke
     finds the knee, and the medial malleoli (`LMED`) that are marked with it.
     """
     landmarks = dict(marker_set.landmarks)
-    for side, own in _devices(labels).items():
+    for side, device in _devices(labels).items():
         end = side[-1].lower()
-        landmarks[f"thigh_wand_{end}"] = (own[0],)
-        malleolus = _like(f"{side}{_MALLEOLUS}", own[0])
+        landmarks[f"thigh_wand_{end}"] = (device[0],)
+        malleolus = _like(f"{side}{_MALLEOLUS}", device[0])
         if f"ankle_medial_{end}" not in landmarks and malleolus in labels:
             landmarks[f"ankle_medial_{end}"] = (malleolus,)
     return replace(marker_set, landmarks=landmarks)

@@ -79,7 +79,7 @@ def _shoulders(
     if len(acromia) == 1:
         ((side, known),) = acromia.items()
         image = known - 2.0 * ((known - lumbar) @ z) * z
-        return {one: known if one == side else image for one in _SIGNS}
+        return {shoulder: known if shoulder == side else image for shoulder in _SIGNS}
     neck = lumbar + length * rotation[:, 1]
     return {side: acromia.get(side, neck + sign * width / 2 * z) for side, sign in _SIGNS.items()}
 

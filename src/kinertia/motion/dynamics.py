@@ -172,7 +172,7 @@ def regressor(tree: KinematicTree, gravity_m_s2: float, x: Float2, v: Float2, a:
     result = np.zeros((n, 6, segments, 10))
     frame = empty_frame(count, gravity_m_s2)
     rotation, translation = np.empty((segments, 3, 3)), np.empty((segments, 3))
-    w, e, b, own = np.empty(3), np.empty(3), np.empty(3), np.empty((6, 10))
+    w, e, b, in_body = np.empty(3), np.empty(3), np.empty(3), np.empty((6, 10))
     for k in range(n):
         move(tree, x[k], v[k], a[k], frame)
         place_segments(tree, frame.rotation, frame.translation, rotation, translation)
@@ -181,8 +181,8 @@ def regressor(tree: KinematicTree, gravity_m_s2: float, x: Float2, v: Float2, a:
             if last_axis < 0:
                 continue
             in_segment(frame.velocity[last_axis], frame.acceleration[last_axis], rotation[s], translation[s], w, e, b)
-            own_regressor(w, e, b, own)
-            to_ground(rotation[s], translation[s], about[k], own, result[k, :, s])
+            own_regressor(w, e, b, in_body)
+            to_ground(rotation[s], translation[s], about[k], in_body, result[k, :, s])
     return result
 
 
@@ -243,13 +243,15 @@ def own_regressor(w: np.ndarray, e: np.ndarray, b: np.ndarray, out: np.ndarray) 
 
 
 @part
-def to_ground(rotation: np.ndarray, at: np.ndarray, about: np.ndarray, own: np.ndarray, out: np.ndarray) -> None:
+def to_ground(rotation: np.ndarray, at: np.ndarray, about: np.ndarray, in_body: np.ndarray, out: np.ndarray) -> None:
     """Write the regressor (6, 10) in ground axes and about another point to `out`; the segment's origin is at `at`."""
     x, y, z = at[0] - about[0], at[1] - about[1], at[2] - about[2]
     for c in range(10):
         for r in range(3):
-            out[r, c] = rotation[r, 0] * own[0, c] + rotation[r, 1] * own[1, c] + rotation[r, 2] * own[2, c]
-            out[3 + r, c] = rotation[r, 0] * own[3, c] + rotation[r, 1] * own[4, c] + rotation[r, 2] * own[5, c]
+            out[r, c] = rotation[r, 0] * in_body[0, c] + rotation[r, 1] * in_body[1, c] + rotation[r, 2] * in_body[2, c]
+            out[3 + r, c] = (
+                rotation[r, 0] * in_body[3, c] + rotation[r, 1] * in_body[4, c] + rotation[r, 2] * in_body[5, c]
+            )
         out[3, c] += y * out[2, c] - z * out[1, c]
         out[4, c] += z * out[0, c] - x * out[2, c]
         out[5, c] += x * out[1, c] - y * out[0, c]

@@ -147,7 +147,7 @@ def found_events(skeleton: Skeleton, kinematics: Kinematics) -> list["FoundEvent
     by_motion = _from_motion(feet_under_pelvis(skeleton, kinematics))
     slack = 0.5 / kinematics.trial.markers.rate_hz
     usable = usable_events(kinematics.trial, by_motion)
-    stated = [one for one in usable if first - slack <= one.time_s <= last + slack]
+    stated = [event for event in usable if first - slack <= event.time_s <= last + slack]
     known = [*edges, *stated]
     events = [
         event
@@ -265,9 +265,9 @@ def _timed(
     shown = [_of_file(event, nearest_event(stated, event, _SAME_EVENT_S)) for event in moved]
     shown += [FoundEvent(event, "file") for event in stated if nearest_event(moved, event, _SAME_STEP_S) is None]
     placed = []
-    for one in shown:
-        seen = nearest_event(edges, one.event, CONTACT_SLACK_S)
-        placed.append(one if seen is None else FoundEvent(seen, "force plate"))
+    for found in shown:
+        seen = nearest_event(edges, found.event, CONTACT_SLACK_S)
+        placed.append(found if seen is None else FoundEvent(seen, "force plate"))
     return sorted(placed)
 
 
@@ -295,10 +295,12 @@ def contact_phases(skeleton: Skeleton, kinematics: Kinematics, strides: Sequence
     for side, phase, start, end in found:
         if start < shown_from or end > shown_to:
             continue
-        number = 1 + sum(one.side == side for one in result)
+        number = 1 + sum(earlier.side == side for earlier in result)
         other = np.nan, np.nan
         if phase == "stance":
-            events = [one.event for one in found_events(skeleton, kinematics)] if events is None else events
+            events = (
+                [found_event.event for found_event in found_events(skeleton, kinematics)] if events is None else events
+            )
             other = _other_foot(trial, events, side, start, end)
         result.append(Stride(side, number, start, end, end, *other, True, phase))
     return tuple(result)
@@ -306,10 +308,13 @@ def contact_phases(skeleton: Skeleton, kinematics: Kinematics, strides: Sequence
 
 def _stances(trial: Trial, strides: Sequence[Stride]) -> Iterator[tuple[str, Phase, float, float]]:
     """Yield side, phase, first and last time of whole stances on plates with which no stride begins."""
-    for one in stances_of(trial):
-        part = any(each.side == one.side and abs(each.start_s - one.start_s) < _SAME_BEGINNING_S for each in strides)
-        if one.whole and not part and _on_plates(trial, FEET.index(one.side), one.start_s, one.end_s):
-            yield one.side, "stance", one.start_s, one.end_s
+    for stance in stances_of(trial):
+        part = any(
+            stride.side == stance.side and abs(stride.start_s - stance.start_s) < _SAME_BEGINNING_S
+            for stride in strides
+        )
+        if stance.whole and not part and _on_plates(trial, FEET.index(stance.side), stance.start_s, stance.end_s):
+            yield stance.side, "stance", stance.start_s, stance.end_s
 
 
 def _other_foot(
@@ -320,8 +325,8 @@ def _other_foot(
     Where there is an event, which is not rounded to frames, its time is used.
     """
     assert trial.on_ground is not None  # else there are no stances
-    own = within(trial.markers.time, start_s, end_s)
-    time, ground = trial.markers.time[own], trial.on_ground[own, 1 - FEET.index(side)]
+    during = within(trial.markers.time, start_s, end_s)
+    time, ground = trial.markers.time[during], trial.on_ground[during, 1 - FEET.index(side)]
     swing = np.flatnonzero(~ground)
     if not len(swing):
         return np.nan, np.nan
@@ -347,14 +352,14 @@ def _landings(skeleton: Skeleton, kinematics: Kinematics) -> Iterator[tuple[str,
     for foot, side in enumerate(FEET):
         for a, b in runs(bridged(loads.time, loads.force[:, foot, 1] >= LOAD_THRESHOLD_N)):
             start, end = float(loads.time[a]), float(loads.time[b])
-            own = np.flatnonzero(within(feet.time, start, min(end, start + _LONGEST_LANDING_S)))
-            if len(own) and speed_m_s[own[0]] <= -_FALLING_M_S:
-                lowest = int(np.argmin(height_m[own]))
+            frames = np.flatnonzero(within(feet.time, start, min(end, start + _LONGEST_LANDING_S)))
+            if len(frames) and speed_m_s[frames[0]] <= -_FALLING_M_S:
+                lowest = int(np.argmin(height_m[frames]))
                 # otherwise the contact or the record ends before the pelvis rises again
-                if lowest < len(own) - 1 and feet.time[own[lowest]] - start >= _SHORTEST_LANDING_S:
-                    yield side, "landing", float(feet.time[own[0]]), float(feet.time[own[lowest]])
+                if lowest < len(frames) - 1 and feet.time[frames[lowest]] - start >= _SHORTEST_LANDING_S:
+                    yield side, "landing", float(feet.time[frames[0]]), float(feet.time[frames[lowest]])
 
 
 def _on_plates(trial: Trial, foot: int, start_s: float, end_s: float) -> bool:
-    own = within(trial.loads.time, start_s, end_s)
-    return bool(own.any() and (trial.loads.force[own, foot, 1] >= LOAD_THRESHOLD_N).mean() >= _MOSTLY)
+    during = within(trial.loads.time, start_s, end_s)
+    return bool(during.any() and (trial.loads.force[during, foot, 1] >= LOAD_THRESHOLD_N).mean() >= _MOSTLY)

@@ -284,12 +284,12 @@ def _columns(wrench: np.ndarray, point: np.ndarray) -> np.ndarray:
     for k in range(wrench.shape[0]):
         for foot in range(wrench.shape[1]):
             load, x, y, z = wrench[k, foot], point[k, foot, 0], point[k, foot, 1], point[k, foot, 2]
-            own = result[k, _EACH * foot : _EACH * (foot + 1)]
+            columns = result[k, _EACH * foot : _EACH * (foot + 1)]
             for c in range(3):
-                own[c], own[3 + c] = load[c], point[k, foot, c]
-            own[6] = load[3] - (y * load[2] - z * load[1])
-            own[7] = load[4] - (z * load[0] - x * load[2])
-            own[8] = load[5] - (x * load[1] - y * load[0])
+                columns[c], columns[3 + c] = load[c], point[k, foot, c]
+            columns[6] = load[3] - (y * load[2] - z * load[1])
+            columns[7] = load[4] - (z * load[0] - x * load[2])
+            columns[8] = load[5] - (x * load[1] - y * load[0])
     return result
 
 

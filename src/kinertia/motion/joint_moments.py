@@ -73,8 +73,8 @@ class BodyJoint:
 
     def columns(self, skeleton: Skeleton) -> list[int]:
         """Return the columns of its coordinates in q."""
-        own = {axis.coordinate for joint in self.joints for axis in joint.axes}
-        return [k for k, name in enumerate(skeleton.coordinates) if name in own]
+        coordinates = {axis.coordinate for joint in self.joints for axis in joint.axes}
+        return [k for k, name in enumerate(skeleton.coordinates) if name in coordinates]
 
     def centre(self, skeleton: Skeleton, pose: Pose) -> np.ndarray:
         """Return the joint centre (n, 3) m in ground; for the ankle that of the joint next to the shank."""
@@ -105,11 +105,11 @@ def lumbar_joint(skeleton: Skeleton) -> BodyJoint | None:
     """Return the joint between pelvis and trunk: of those that carry no foot, the one with most beyond it."""
     pelvis, found = skeleton.segments[0], []
     for joint in skeleton.joints:
-        own = BodyJoint("Lumbar", "", joint.parent, joint.child, (joint,))
-        beyond = {skeleton.segments[row] for row in _beyond(skeleton, own)}
+        candidate = BodyJoint("Lumbar", "", joint.parent, joint.child, (joint,))
+        beyond = {skeleton.segments[row] for row in _beyond(skeleton, candidate)}
         if joint.parent == pelvis and not beyond & set(skeleton.feet):
-            found.append((len(beyond), own))
-    return max(found, key=lambda each: each[0])[1] if found else None
+            found.append((len(beyond), candidate))
+    return max(found, key=lambda reach: reach[0])[1] if found else None
 
 
 def body_joints(skeleton: Skeleton) -> tuple[BodyJoint, ...]:
@@ -146,8 +146,8 @@ def joint_wrenches(
     for part in (bsp, skeleton.carried):
         if part is not None:
             loads = root_regressor(skeleton, part.segments, motion).reshape(len(motion.q), 6, -1, 10)
-            own = np.einsum("nisk,sk->sni", loads, part.dynamic_parameters().reshape(-1, 10))
-            np.add.at(needed, [skeleton.segments.index(name) for name in part.segments], own)
+            wrenches = np.einsum("nisk,sk->sni", loads, part.dynamic_parameters().reshape(-1, 10))
+            np.add.at(needed, [skeleton.segments.index(name) for name in part.segments], wrenches)
     ground = np.concatenate([foot_loads[..., :3], foot_loads[..., 3:]], axis=-1).copy()
     ground[..., 3:] -= np.cross(about[:, None], ground[..., :3])
     result = {}
@@ -162,9 +162,9 @@ def joint_wrenches(
 def _beyond(skeleton: Skeleton, joint: BodyJoint) -> list[int]:
     """Return the rows of the segments distal to a joint."""
     carried = {joint.joints[0].child}
-    for each in skeleton.joints:  # parents before children
-        if each.parent in carried:
-            carried.add(each.child)
+    for distal in skeleton.joints:  # parents before children
+        if distal.parent in carried:
+            carried.add(distal.child)
     return [row for row, name in enumerate(skeleton.segments) if name in carried]
 
 
@@ -189,7 +189,7 @@ class VirtualAxes:
     def of(cls, skeleton: Skeleton, joints: Sequence[BodyJoint]) -> Self:
         """Add the axes at the centres of these joints."""
         names = [[f"virtual {joint.label} {kind} {axis}" for kind in _KINDS for axis in "xyz"] for joint in joints]
-        added = {joint.joints[0].child: own for joint, own in zip(joints, names, strict=True)}
+        added = {joint.joints[0].child: axis_names for joint, axis_names in zip(joints, names, strict=True)}
         every = []
         for joint in skeleton.joints:
             directions = joint.child_rotation.T  # of the child's axes in the joint's far frame, in columns
@@ -203,7 +203,10 @@ class VirtualAxes:
         index = {name: k for k, name in enumerate(larger.coordinates)}
         former = np.array([index[name] for name in skeleton.coordinates], dtype=int)
         return cls(
-            larger, tuple(joints), former, np.array([[index[n] for n in own] for own in names], int).reshape(-1, 6)
+            larger,
+            tuple(joints),
+            former,
+            np.array([[index[n] for n in axis_names] for axis_names in names], int).reshape(-1, 6),
         )
 
     def embedded(self, values: np.ndarray) -> np.ndarray:
@@ -313,15 +316,19 @@ def joint_moments(
     joints, n = body_joints(skeleton), len(motion.q)
     moments, forces = np.empty((n, len(joints), 3)), np.empty((n, len(joints), 3))
     for some in pieces(n):
-        own = motion.cut(some)
-        pose = skeleton.pose(own.q)
-        wrenches = joint_wrenches(skeleton, bsp, own, foot_loads[some], joints)
+        part = motion.cut(some)
+        pose = skeleton.pose(part.q)
+        wrenches = joint_wrenches(skeleton, bsp, part, foot_loads[some], joints)
         for k, joint in enumerate(joints):
-            parent, child = (pose.rotation[:, skeleton.segments.index(one)] for one in (joint.parent, joint.child))
+            parent, child = (
+                pose.rotation[:, skeleton.segments.index(segment)] for segment in (joint.parent, joint.child)
+            )
             axes, wrench = joint_axes(parent, child, frame, joint.long_axis), wrenches[joint]
             moments[some, k] = component_signs(joint) * np.einsum("nak,nk->na", axes, wrench[:, 3:])
             forces[some, k] = np.einsum("nka,nk->na", child, wrench[:, :3])
-    return JointMoments(tuple(one.label for one in joints), moments, forces, constraints(skeleton, joints))
+    return JointMoments(
+        tuple(moved_joint.label for moved_joint in joints), moments, forces, constraints(skeleton, joints)
+    )
 
 
 def constraints(skeleton: Skeleton, joints: Sequence[BodyJoint]) -> np.ndarray:
@@ -329,7 +336,7 @@ def constraints(skeleton: Skeleton, joints: Sequence[BodyJoint]) -> np.ndarray:
     pose = skeleton.pose(np.zeros((1, len(skeleton.coordinates))))
     result = np.zeros((len(joints), 3), dtype=bool)
     for row, joint in enumerate(joints):
-        parent, child = (skeleton.segments.index(one) for one in (joint.parent, joint.child))
+        parent, child = (skeleton.segments.index(segment) for segment in (joint.parent, joint.child))
         between = skeleton.support[child] & ~skeleton.support[parent]
         slopes = np.ones(len(between)) if pose.slopes is None else pose.slopes[0]
         turning = pose.axes[0, :, 3:] * (slopes * between)[:, None]

@@ -123,9 +123,9 @@ class Kinematics:
     @cached_property
     def span_s(self) -> tuple[float, float]:
         """First and last time of the samples that determine the motion: of `trajectory_frames` and around them."""
-        (start, end), own = self.window_s, self.trajectory_time
+        (start, end), time = self.window_s, self.trajectory_time
         ends_s = END_PERIODS / self.cutoff_hz
-        first, last = min(start - AROUND_WINDOW_S, own[0] - ends_s), max(end + AROUND_WINDOW_S, own[-1] + ends_s)
+        first, last = min(start - AROUND_WINDOW_S, time[0] - ends_s), max(end + AROUND_WINDOW_S, time[-1] + ends_s)
         return float(first), float(last)
 
     @cached_property
@@ -267,7 +267,7 @@ def known_forces(skeleton: Skeleton, trial: Trial, seen: np.ndarray) -> np.ndarr
     of_axes = np.equal.outer(skeleton.map.owner, np.arange(len(skeleton.coordinates)))
     moves = skeleton.support.astype(int) @ of_axes > 0
     needed = moves.T.astype(int) @ moves > 0  # coordinates that move any segment that this one moves
-    known = np.stack([seen[:, own].all(axis=1) for own in needed], axis=1)
+    known = np.stack([seen[:, axes].all(axis=1) for axes in needed], axis=1)
     for foot, segment in enumerate(skeleton.feet):
         known[:, moves[skeleton.segments.index(segment)]] &= trial.known_legs[:, foot, None]
     known[:, : len(skeleton.joints[0].axes)] = False  # the measured windows are added to it

@@ -122,14 +122,14 @@ def normal_equations(
         hand_down(tree.parent, forces)
         for j in range(a):
             met_force(sums, j, axes, j, met)
-            here, own = slopes[k, j], owner[j]
-            gradient[k, own] += here * inner(axes, j, forces, j)
-            normal[k, own, own] += here * here * inner(axes, j, met, j)
+            here, coordinate = slopes[k, j], owner[j]
+            gradient[k, coordinate] += here * inner(axes, j, forces, j)
+            normal[k, coordinate, coordinate] += here * here * inner(axes, j, met, j)
             i = tree.parent[j]
             while i >= 0:
                 value = here * slopes[k, i] * inner(axes, i, met, j)
-                normal[k, own, owner[i]] += value
-                normal[k, owner[i], own] += value
+                normal[k, coordinate, owner[i]] += value
+                normal[k, owner[i], coordinate] += value
                 i = tree.parent[i]
     return normal, gradient, cost
 

@@ -164,7 +164,7 @@ def plug_in_gait_angles(skeleton: Skeleton, q: np.ndarray, heading_rad: np.ndarr
         return {}
     pose = skeleton.pose(q)
     found = _of_pelvis_and_feet(skeleton, pose, True, Rotation.from_euler("Y", heading_rad[:, None]).as_matrix())
-    angles = {one.name: one.values for one in found}
+    angles = {output.name: output.values for output in found}
     for joint in joints:
         parent, child = (_rotation(skeleton, pose, segment) for segment in (joint.parent, joint.child))
         angles[f"{joint.side.upper()}{joint.name}Angles"] = np.degrees(component_signs(joint) * _cardan(parent, child))
@@ -217,8 +217,10 @@ def _covariance(sd: np.ndarray, departures: np.ndarray | None) -> np.ndarray:
         alone: np.ndarray = np.eye(sd.shape[1]) * np.square(sd)[:, None]
         return alone
     products = np.einsum("mni,mnj->nij", departures, departures)
-    own = np.sqrt(np.maximum(np.einsum("nii->ni", products), np.finfo(float).tiny))
-    result: np.ndarray = products / (own[:, :, None] * own[:, None]) * sd[:, :, None] * sd[:, None]
+    sd_of_products = np.sqrt(np.maximum(np.einsum("nii->ni", products), np.finfo(float).tiny))
+    result: np.ndarray = (
+        products / (sd_of_products[:, :, None] * sd_of_products[:, None]) * sd[:, :, None] * sd[:, None]
+    )
     return result
 
 
@@ -312,7 +314,7 @@ def clinical_angles(skeleton: Skeleton, q: np.ndarray, heading_rad: np.ndarray) 
     for side, name in zip(FEET, skeleton.feet, strict=True) if outputs else ():
         foot = skeleton.segments.index(name)
         known = np.isfinite(q[:, np.unique(skeleton.map.owner[skeleton.support[foot]])]).all(axis=1)
-        for quantity, one in CLINICAL_ANGLES.items():
-            values = outputs[f"{side.upper()}{one.joint}Angles"][:, one.component]
+        for quantity, angle in CLINICAL_ANGLES.items():
+            values = outputs[f"{side.upper()}{angle.joint}Angles"][:, angle.component]
             result[side][quantity] = np.where(known, values, np.nan)
     return result

@@ -77,8 +77,8 @@ class PoseFit:
 
     def put(self, rows: np.ndarray, other: "PoseFit", kept: np.ndarray) -> None:
         """Overwrite those of these rows that are `kept` (r,) by the rows of another result."""
-        for own, new in zip(self._arrays, other._arrays, strict=True):
-            own[rows[kept]] = new[kept]
+        for old, new in zip(self._arrays, other._arrays, strict=True):
+            old[rows[kept]] = new[kept]
 
     @property
     def _arrays(self) -> tuple[np.ndarray, ...]:
@@ -207,9 +207,9 @@ class EquivalentAngles:
         """Return the equivalents of poses q (..., c) that are nearest to other poses (..., c)."""
         q = q.copy()
         for joint in self.joints:
-            own, goal = q[..., joint.columns], to[..., joint.columns]
-            equals = [goal + within_half_a_turn(one - goal) for one in (own, joint.equivalent(own))]
-            same, twin = (np.abs(one - goal).sum(axis=-1, keepdims=True) for one in equals)
+            angles, goal = q[..., joint.columns], to[..., joint.columns]
+            equals = [goal + within_half_a_turn(turned - goal) for turned in (angles, joint.equivalent(angles))]
+            same, twin = (np.abs(equal - goal).sum(axis=-1, keepdims=True) for equal in equals)
             q[..., joint.columns] = np.where(twin < same, equals[1], equals[0])
         goal = to[..., self.single]
         q[..., self.single] = goal + within_half_a_turn(q[..., self.single] - goal)
@@ -240,7 +240,7 @@ class EquivalentAngles:
         if joint is not None:
             equivalent = joint.equivalent(angles)
             stay, change = (
-                np.abs(within_half_a_turn(one[1:] - angles[:-1])).sum(axis=1) for one in (angles, equivalent)
+                np.abs(within_half_a_turn(branch[1:] - angles[:-1])).sum(axis=1) for branch in (angles, equivalent)
             )
             # changes between second solutions are as large as between the angles themselves
             other = np.concatenate([[False], np.logical_xor.accumulate(change < stay)])[:, None]
@@ -318,17 +318,17 @@ def stance_pose(markers: Markers, marker_set: MarkerSet) -> Markers | None:
     base = frames["r"]
     if base is None or frames["l"] is None:
         return None
-    left = {label for name, own in marker_set.segments.items() if name.startswith(_LEFT_LEG) for label in own}
+    left = {label for name, labels in marker_set.segments.items() if name.startswith(_LEFT_LEG) for label in labels}
     heading = np.arctan2(across[:, 0], across[:, 2])
     near = round(_NEAR_S * markers.rate_hz)
     pose = np.full((1, len(markers.labels), 3), np.nan)
     for k, label in enumerate(markers.labels):
-        own = frames["l" if label in left else "r"]
+        reference = frames["l" if label in left else "r"]
         shown = np.flatnonzero(pelvis & np.isfinite(markers.positions[:, k, 0]))
-        if own is None or not shown.size:
+        if reference is None or not shown.size:
             continue
-        frame = shown[np.argmin(np.abs(shown - own))]
-        if abs(frame - own) <= near:
+        frame = shown[np.argmin(np.abs(shown - reference))]
+        if abs(frame - reference) <= near:
             turn = heading[base] - heading[frame]
             pose[0, k] = middle[base] + _turned(markers.positions[frame, k] - middle[frame], turn)
     return Markers(markers.time[[base]], markers.labels, pose)
@@ -336,10 +336,10 @@ def stance_pose(markers: Markers, marker_set: MarkerSet) -> Markers | None:
 
 def _landmark(markers: Markers, labels: tuple[str, ...]) -> FloatArray:
     """Return the mean position (n, 3) m of those labels that the trial has; NaN without any."""
-    own = [label for label in labels if label in markers.labels]
-    if not own:
+    known = [label for label in labels if label in markers.labels]
+    if not known:
         return np.full((len(markers.time), 3), np.nan)
-    middle: FloatArray = markers.select(own).positions.mean(axis=1)
+    middle: FloatArray = markers.select(known).positions.mean(axis=1)
     return middle
 
 
@@ -359,7 +359,7 @@ def _flat_frame(place: Mapping[str, FloatArray], pelvis: np.ndarray, side: str) 
     shown = np.flatnonzero(pelvis & np.isfinite(heel + forefoot + ankle + knee).all(axis=1))
     if not shown.size:
         return None
-    lowest = [float(np.percentile(each[shown, 1], _LOWEST_PERCENT)) for each in (heel, forefoot)]
+    lowest = [float(np.percentile(positions[shown, 1], _LOWEST_PERCENT)) for positions in (heel, forefoot)]
     height = heel[shown, 1] + forefoot[shown, 1] - sum(lowest)
     shank = (knee - ankle)[shown]
     lean = np.linalg.norm(shank[:, [0, 2]], axis=1) / np.linalg.norm(shank, axis=1)

@@ -209,10 +209,10 @@ def _natural(time: Array, values: Array) -> BSpline:
         ends = [(3, np.zeros(values.shape[1])), (4, np.zeros(values.shape[1]))]
         return make_interp_spline(time, values, k=5, bc_type=(ends, ends))
     coefficients = np.empty((n + 4, values.shape[1]))
-    for own in pieces(n, _ROWS_AT_ONCE):
-        near = slice(max(own.start - _FORGOTTEN_SAMPLES, 0), min(own.stop + _FORGOTTEN_SAMPLES, n))
+    for piece in pieces(n, _ROWS_AT_ONCE):
+        near = slice(max(piece.start - _FORGOTTEN_SAMPLES, 0), min(piece.stop + _FORGOTTEN_SAMPLES, n))
         # the splines are two samples before those of the same index
-        kept = slice(own.start and own.start + 2, own.stop + (2 if own.stop < n else 4))
+        kept = slice(piece.start and piece.start + 2, piece.stop + (2 if piece.stop < n else 4))
         part = _natural(time[near], values[near]).c
         coefficients[kept] = part[kept.start - near.start : kept.stop - near.start]
     knots = np.concatenate([np.full(5, time[0]), time, np.full(5, time[-1])])
@@ -306,8 +306,8 @@ class _System:
         """Build the matrices part by part: row j of either depends on t[j] to t[j + 5] only."""
         parts = [_matrices(t[rows.start : rows.stop + 5].tobytes()) for rows in pieces(len(t) - 3, _ROWS_AT_ONCE)]
         rows = [slice(0, _ROWS_AT_ONCE)] * (len(parts) - 1) + [slice(None)]
-        differences = [own[kept] for (own, _), kept in zip(parts, rows, strict=True)]
-        gram = [own[:, kept] for (_, own), kept in zip(parts, rows, strict=True)]
+        differences = [difference[kept] for (difference, _), kept in zip(parts, rows, strict=True)]
+        gram = [part_gram[:, kept] for (_, part_gram), kept in zip(parts, rows, strict=True)]
         return cls(np.concatenate(differences), np.concatenate(gram, axis=1), float(np.diff(t).min()))
 
     def fit(self, y: Array, visible: NDArray[np.bool_], f: float) -> tuple[Array, Array, float]:
@@ -321,14 +321,14 @@ class _System:
         if n <= 2 * most or not visible.all():
             return self._fit(y, visible, f)
         fitted, rss, trace = np.empty_like(y), np.zeros(y.shape[1]), 0.0
-        for own in pieces(n, most):
-            near = slice(max(own.start - around, 0), min(own.stop + around, n))
+        for piece in pieces(n, most):
+            near = slice(max(piece.start - around, 0), min(piece.stop + around, n))
             part, _, of_part = self._cut(near)._fit(y[near], visible[near], f)
-            fitted[own] = part[own.start - near.start : own.stop - near.start]
-            rss += np.square(y[own] - fitted[own]).sum(axis=0)
+            fitted[piece] = part[piece.start - near.start : piece.stop - near.start]
+            rss += np.square(y[piece] - fitted[piece]).sum(axis=0)
             trace += of_part
-            if own.start:
-                shared = slice(near.start, min(own.start + around, n))
+            if piece.start:
+                shared = slice(near.start, min(piece.start + around, n))
                 trace -= self._cut(shared)._fit(y[shared, :1], visible[shared], f)[2]
         return fitted, rss, trace
 

@@ -137,10 +137,10 @@ def _at(feet: FeetUnderPelvis, values: np.ndarray, time_s: float) -> np.ndarray:
 
 def _belt_velocities(feet: FeetUnderPelvis, strides: Sequence[Stride]) -> dict[str, np.ndarray]:
     """Return the velocity by side: of both feet together, unless they are on belts of different speeds."""
-    own = {side: _belt_velocity(feet, [one for one in strides if one.side == side]) for side in FEET}
-    moving = all(velocity.any() for velocity in own.values())
-    apart = np.linalg.norm(own["r"] - own["l"]) > _BELT_M_S
-    return own if moving and apart else dict.fromkeys(FEET, _belt_velocity(feet, strides))
+    by_side = {side: _belt_velocity(feet, [stride for stride in strides if stride.side == side]) for side in FEET}
+    moving = all(velocity.any() for velocity in by_side.values())
+    apart = np.linalg.norm(by_side["r"] - by_side["l"]) > _BELT_M_S
+    return by_side if moving and apart else dict.fromkeys(FEET, _belt_velocity(feet, strides))
 
 
 def _belt_velocity(feet: FeetUnderPelvis, strides: Sequence[Stride]) -> np.ndarray:

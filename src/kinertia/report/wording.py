@@ -23,13 +23,13 @@ class Start:
 
     Attributes:
         word: name in headings and legends.
-        of: name in sentences.
+        phrase: name in sentences.
         whose: possessive, "the literature's" or "the model's".
         values: name of the stage of residuals and moments.
     """
 
     word: str
-    of: str
+    phrase: str
     whose: str
     values: str
 

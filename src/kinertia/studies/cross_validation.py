@@ -87,8 +87,10 @@ def cross_validate(
         )
     used = Bandwidth.of(trials, cutoff_hz)
 
-    def fit(one: Prepared, otherwise: Sequence[Kinematics]) -> SimultaneousFit:
-        return fit_simultaneous(one.skeleton, one.prior, one.kinematics, used, one.uncertainty, otherwise=otherwise)
+    def fit(trained: Prepared, otherwise: Sequence[Kinematics]) -> SimultaneousFit:
+        return fit_simultaneous(
+            trained.skeleton, trained.prior, trained.kinematics, used, trained.uncertainty, otherwise=otherwise
+        )
 
     ready = with_likelier_sign(ready, fit).ready
     trials = ready.kinematics
@@ -97,8 +99,8 @@ def cross_validate(
     for k, held in enumerate(trials):
         progress("held out", k / len(trials))
         others = [other for other in trials if other is not held]
-        own = [bandwidths[other] for other in others]
-        estimate = fit_simultaneous(ready.skeleton, ready.prior, others, own, ready.uncertainty).result.bsp
+        bandwidths_used = [bandwidths[other] for other in others]
+        estimate = fit_simultaneous(ready.skeleton, ready.prior, others, bandwidths_used, ready.uncertainty).result.bsp
         explained = (_explained(ready, bsp, held, bandwidths[held]) for bsp in (ready.prior.mean, estimate))
         held_out.append(HeldOut(held.trial.name, tuple(other.trial.name for other in others), *explained))
     return tuple(held_out)

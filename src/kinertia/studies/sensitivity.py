@@ -189,9 +189,9 @@ def _run_draw(seed: int, case: tuple[Scenario, int]) -> _Draw:
 
 def _errors(draws: list[_Draw], segments: tuple[str, ...], names: list[str]) -> np.ndarray:
     """Return the RMS (len(names) * 7,) over people and sides, relative to the literature's."""
-    own, before = (
+    squares, before = (
         np.square([getattr(draw, kind) for draw in draws]).mean(axis=0)[:, : len(SHOWN)]
         for kind in ("errors", "literature_errors")
     )
     of_name = [[i for i, s in enumerate(segments) if s.removesuffix("_r").removesuffix("_l") == name] for name in names]
-    return np.sqrt([own[rows].sum(axis=0) / before[rows].sum(axis=0) for rows in of_name]).ravel()
+    return np.sqrt([squares[rows].sum(axis=0) / before[rows].sum(axis=0) for rows in of_name]).ravel()

@@ -149,7 +149,10 @@ def _contacts(trial: SyntheticTrial, samples: int) -> list[tuple[int, int, int]]
     ]
     whole.sort(key=lambda contact: contact[1])
     pairs = [
-        (one, other) for one in whole for other in whole if one[0] != other[0] and one[1] < other[1] < one[2] < other[2]
+        (contact, other)
+        for contact in whole
+        for other in whole
+        if contact[0] != other[0] and contact[1] < other[1] < contact[2] < other[2]
     ]
     if not pairs:
         raise TrialError("synthetic", "it holds no whole contact of each foot in turn; make it about two strides long")
@@ -260,7 +263,9 @@ class SkinMotion:
             columns = skin_angles(skeleton, segment)
             directions = rng.standard_normal((len(columns), 3))
             low, high = artefact_range(segment)
-            walking, overall = (np.linalg.norm(np.ptp(each[:, columns] @ directions, axis=0)) for each in (q, every))
+            walking, overall = (
+                np.linalg.norm(np.ptp(angles[:, columns] @ directions, axis=0)) for angles in (q, every)
+            )
             extent = max(walking, overall / 2.0)
             slopes[segment] = directions * (rng.uniform(low, high) / extent if extent > 0 else 0.0)
         return cls(slopes, reference)
@@ -331,9 +336,9 @@ class ClusterMotion:
         pose, positions = skeleton.pose(q), markers.positions.copy()
         phase = 2.0 * np.pi * (markers.time / STRIDE_S)[:, None] * _HARMONICS
         for segment, (cosines, sines) in self.waves.items():
-            own = [m for m in skeleton.markers if m.segment == segment and m.label in markers.labels]
-            columns = [markers.labels.index(marker.label) for marker in own]
-            places = np.array([marker.position for marker in own])
+            cluster = [m for m in skeleton.markers if m.segment == segment and m.label in markers.labels]
+            columns = [markers.labels.index(marker.label) for marker in cluster]
+            places = np.array([marker.position for marker in cluster])
             path = np.cos(phase) @ cosines + np.sin(phase) @ sines
             local = path[:, None, :3] + np.cross(path[:, None, 3:], places - places.mean(axis=0))
             turn = pose.rotation[:, None, skeleton.segments.index(segment)]

@@ -89,8 +89,8 @@ def measured(
         if faults.wobbling:
             loads += _wobbled(trial, faults.wobbling)
         if instruments is not None:
-            own = instruments.in_trial(rng, prior, len(trials) > 1) if faults.calibration else instruments
-            loads = own.read(trial.time, loads)
+            errors = instruments.in_trial(rng, prior, len(trials) > 1) if faults.calibration else instruments
+            loads = errors.read(trial.time, loads)
         kinematics.append(_kinematics(skeleton, trial.time, seen, loads))
     return skeleton, kinematics
 
@@ -111,7 +111,10 @@ def _disturbed(trials: Sequence[SyntheticTrial], faults: Faults, rng: np.random.
         if not skin:
             moved = study_noise(exact, rng).positions - exact.positions
         else:
-            parts = (share * (each.moved(exact, trial.skeleton, q).positions - exact.positions) for share, each in skin)
+            parts = (
+                share * (motion_of_skin.moved(exact, trial.skeleton, q).positions - exact.positions)
+                for share, motion_of_skin in skin
+            )
             moved = np.sum(list(parts), axis=0)
         scaled = replace(exact, positions=exact.positions + faults.amplitude * moved)
         markers.append(camera_noise(scaled, CAMERA_SD_M, rng) if skin else scaled)
@@ -149,8 +152,8 @@ class _Instruments:
     @classmethod
     def draw(cls, rng: np.random.Generator, prior: InstrumentPrior) -> Self:
         """Draw the errors from a prior of `fit_simultaneous`."""
-        own = {name: each for name, each in prior.plate.items() if name != "turn"}
-        plates = np.array([[each.draw(rng) for each in own.values()] for _ in range(2)])
+        priors = {name: plate_prior for name, plate_prior in prior.plate.items() if name != "turn"}
+        plates = np.array([[plate_prior.draw(rng) for plate_prior in priors.values()] for _ in range(2)])
         x, z = (prior.floor[name].draw(rng) for name in "xz")
         offset = np.column_stack([plates[:, 0] + x, np.zeros(2), plates[:, 1] + z])
         delay_s = prior.delay_s.draw(rng)
@@ -162,8 +165,8 @@ class _Instruments:
         """Add the errors of a single trial: zero offsets, gains, and a delay if it is one of several or was not
         checked."""
         zero = np.array([[prior.zero_offset_n.draw(rng), 0.0, prior.zero_offset_n.draw(rng)] for _ in range(2)])
-        own = one_of_several or prior.delay_s.fault_probability > 0.0
-        trial_delay_s = prior.trial_delay_s.draw(rng) if own else 0.0
+        delayed = one_of_several or prior.delay_s.fault_probability > 0.0
+        trial_delay_s = prior.trial_delay_s.draw(rng) if delayed else 0.0
         gain = self.gain + [[prior.trial_gain.draw(rng)] for _ in range(2)]
         return replace(self, zero_offset_n=zero, delay_s=self.delay_s + trial_delay_s, gain=gain)
 

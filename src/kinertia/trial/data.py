@@ -226,13 +226,13 @@ class Recording:
     @property
     def notes(self) -> tuple[str, ...]:
         """Assumptions and corrections made while reading, one sentence each."""
-        notes = [one for one in self.findings if one.severity < Severity.WARNING]
-        return tuple(f"{one.where.file or self.name}: {one.message}" for one in notes)
+        notes = [reported for reported in self.findings if reported.severity < Severity.WARNING]
+        return tuple(f"{note.where.file or self.name}: {note.message}" for note in notes)
 
     @property
     def left_out(self) -> tuple[str, ...]:
         """Reasons why plates in the file cannot be used, one per plate."""
-        return tuple(one.message for one in self.findings if one.code == "F151")
+        return tuple(reported.message for reported in self.findings if reported.code == "F151")
 
     def without_markers(self, labels: Sequence[str]) -> Recording:
         """Return the recording without these markers.

@@ -92,7 +92,7 @@ class FileOutputs:
 
     def rotated(self, rotation: FloatArray) -> Self:
         """Return the same outputs with points in axes rotated by `rotation` (3, 3): new = rotation @ old."""
-        return replace(self, points={name: each @ rotation.T for name, each in self.points.items()})
+        return replace(self, points={name: point @ rotation.T for name, point in self.points.items()})
 
 
 class TorqueColumns(NamedTuple):

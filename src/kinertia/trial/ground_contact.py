@@ -142,20 +142,20 @@ def _between(
     for foot in range(2):
         both = loaded[:, foot] & ground[:, 1 - foot] & ~loaded[:, 1 - foot]
         for first, last in runs(both):
-            own = slice(first, last + 1)
-            wrench = loads.wrench[nearest[own], foot]
+            during = slice(first, last + 1)
+            wrench = loads.wrench[nearest[during], foot]
             pressure = np.column_stack([wrench[:, 5], -wrench[:, 3]]) / np.maximum(wrench[:, 1:2], LOAD_THRESHOLD_N)
-            share = _share_of_gap(pressure, points[foot][own], points[1 - foot][own])
-            result[own, foot] = (share > _BETWEEN).mean() > _BETWEEN_FRAMES
+            share = _share_of_gap(pressure, points[foot][during], points[1 - foot][during])
+            result[during, foot] = (share > _BETWEEN).mean() > _BETWEEN_FRAMES
     return result
 
 
-def _share_of_gap(pressure: FloatArray, own: FloatArray, other: FloatArray) -> FloatArray:
+def _share_of_gap(pressure: FloatArray, points: FloatArray, other: FloatArray) -> FloatArray:
     """Return how far (n,) of the way from one foot's nearest marker to the other's a centre of pressure (n, 2) is."""
-    apart = np.linalg.norm(own[:, :, None] - other[:, None], axis=-1)
-    pair = np.where(np.isfinite(apart), apart, np.inf).reshape(len(own), -1).argmin(axis=1)
-    each = np.arange(len(own))
-    start, end = own[each, pair // other.shape[1]], other[each, pair % other.shape[1]]
+    apart = np.linalg.norm(points[:, :, None] - other[:, None], axis=-1)
+    pair = np.where(np.isfinite(apart), apart, np.inf).reshape(len(points), -1).argmin(axis=1)
+    frames = np.arange(len(points))
+    start, end = points[frames, pair // other.shape[1]], other[frames, pair % other.shape[1]]
     gap = end - start
     along = np.einsum("ni,ni->n", pressure - start, gap) / np.maximum(np.square(gap).sum(axis=1), 1e-6)
     result: FloatArray = np.nan_to_num(along)

@@ -152,9 +152,9 @@ def _as_stated(
 ) -> npt.NDArray[np.int_]:
     """Return the feet (k,) with those that the user states for this plate; -1 for no foot."""
     result = nearer.copy()
-    for one in recording.stated_contacts:
-        if one.plate == plate:
-            result[within(time, *one.span_s)] = -1 if one.foot is None else one.foot
+    for contact in recording.stated_contacts:
+        if contact.plate == plate:
+            result[within(time, *contact.span_s)] = -1 if contact.foot is None else contact.foot
     return result
 
 
@@ -162,10 +162,10 @@ def _stated(recording: Recording) -> list[Finding]:
     """Make P286 for each load whose foot the user states."""
     time = recording.markers.time
     found = []
-    for one in recording.stated_contacts:
-        span = (max(one.span_s[0], float(time[0])), min(one.span_s[1], float(time[-1])))
-        foot = "no foot" if one.foot is None else f"the {FOOT_NAMES[one.foot]} foot"
-        where = Where(trial=recording.name, plate=one.plate, span_s=span)
+    for contact in recording.stated_contacts:
+        span = (max(contact.span_s[0], float(time[0])), min(contact.span_s[1], float(time[-1])))
+        foot = "no foot" if contact.foot is None else f"the {FOOT_NAMES[contact.foot]} foot"
+        where = Where(trial=recording.name, plate=contact.plate, span_s=span)
         found.append(finding("P286", where, foot=Quantity(foot)))
     return found
 

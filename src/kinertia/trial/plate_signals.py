@@ -82,7 +82,7 @@ def without_spikes(
         np.column_stack([np.interp(time, time[unaffected], column[unaffected]) for column in signal.T])
         for signal in (force, moment)
     ]
-    return bridged[0], bridged[1], tuple(one for *_, one in spikes)
+    return bridged[0], bridged[1], tuple(spike for *_, spike in spikes)
 
 
 def _distance_from_median(force: FloatArray, around: int) -> FloatArray:

@@ -73,7 +73,7 @@ def stances_of(trial: Trial) -> tuple[Stance, ...]:
     result: list[Stance] = []
     for foot, side in enumerate(FEET):
         number = 0
-        for start, end, begins, ends in (one[1:] for one in found if one[0] == foot):
+        for start, end, begins, ends in (span[1:] for span in found if span[0] == foot):
             if begins and ends and not _STANCE_S[0] <= end - start <= _STANCE_S[1]:
                 continue
             if not (begins or ends) or not ((begins and ends) or end - start <= _STANCE_S[1]) or not whole:
@@ -89,11 +89,11 @@ def _by_plates(trial: Trial, foot: int, first: int, last: int) -> tuple[float, f
     """Return the times (s) of foot contact and foot off: of the load, if these frames differ from it by little."""
     start, end = (float(trial.markers.time[k]) for k in (first, last))
     near = within(trial.loads.time, start - _SAME_CONTACT_S, end + _SAME_CONTACT_S)
-    own = trial.loads.time[near]
-    loaded = own[trial.loads.force[near, foot, 1] >= LOAD_THRESHOLD_N]
+    time = trial.loads.time[near]
+    loaded = time[trial.loads.force[near, foot, 1] >= LOAD_THRESHOLD_N]
     if len(loaded):
-        start = float(loaded[0]) if own[0] < loaded[0] <= start + _SAME_CONTACT_S else start
-        end = float(loaded[-1]) if end - _SAME_CONTACT_S <= loaded[-1] < own[-1] else end
+        start = float(loaded[0]) if time[0] < loaded[0] <= start + _SAME_CONTACT_S else start
+        end = float(loaded[-1]) if end - _SAME_CONTACT_S <= loaded[-1] < time[-1] else end
     return start, end
 
 
@@ -144,7 +144,7 @@ class LegCoverage:
 
     def joined(self, other: Self) -> Self:
         """Return what is known in either."""
-        strides = [one for one in (self.stride, other.stride) if one is not None]
+        strides = [share for share in (self.stride, other.stride) if share is not None]
         stride = np.logical_or.reduce(strides) if strides else None
         return type(self)(self.side, self.stance | other.stance, stride)
 
@@ -166,10 +166,12 @@ def leg_coverage(trial: Trial, known: BoolArray) -> tuple[LegCoverage, ...]:
         return ()
     result = []
     for foot, side in enumerate(FEET):
-        own = [one for one in stances if one.side == side]
-        starts = [one.start_s for one in own]
+        of_side = [stance_of_foot for stance_of_foot in stances if stance_of_foot.side == side]
+        starts = [stance_of_foot.start_s for stance_of_foot in of_side]
         strides = [(a, b) for a, b in pairwise(starts) if _STRIDE_S[0] <= b - a <= _STRIDE_S[1]]
-        stance = _union(time, known[:, foot], [(one.start_s, one.end_s) for one in own])
+        stance = _union(
+            time, known[:, foot], [(stance_of_foot.start_s, stance_of_foot.end_s) for stance_of_foot in of_side]
+        )
         result.append(LegCoverage(side, stance, _union(time, known[:, foot], strides) if strides else None))
     return tuple(result)
 
@@ -177,8 +179,8 @@ def leg_coverage(trial: Trial, known: BoolArray) -> tuple[LegCoverage, ...]:
 def joined_coverage(trials: Iterable[Sequence[LegCoverage]]) -> tuple[LegCoverage, ...]:
     """Return what is known of each leg in any of several trials."""
     result: dict[str, LegCoverage] = {}
-    for one in (leg for legs in trials for leg in legs):
-        result[one.side] = result[one.side].joined(one) if one.side in result else one
+    for coverage in (leg for legs in trials for leg in legs):
+        result[coverage.side] = result[coverage.side].joined(coverage) if coverage.side in result else coverage
     return tuple(result.values())
 
 
@@ -204,8 +206,8 @@ def _parts(mask: BoolArray) -> list[list[int]]:
     return [[int(first), int(last)] for first, last in runs(mask)]
 
 
-def _ranges(mask: BoolArray, of: str) -> str:
-    return f"{' and '.join(f'{first} to {last} %' for first, last in _parts(mask)) or 'nothing'} of {of}"
+def _ranges(mask: BoolArray, whole: str) -> str:
+    return f"{' and '.join(f'{first} to {last} %' for first, last in _parts(mask)) or 'nothing'} of {whole}"
 
 
 def gait_events(trial: Trial) -> list[GaitEvent]:
@@ -236,8 +238,14 @@ def load_edges(loads: FootLoads) -> list[GaitEvent]:
 def contradicted_events(trial: Trial) -> list[tuple[FileEvent, GaitEvent]]:
     """Return the stated events that are more than `EVENT_LIMIT_S` from the detected ones, in pairs."""
     shown = gait_events(trial)
-    pairs = [(one, nearest_event(shown, one.of_gait, SAME_EVENT_S)) for one in trial.events if one.of_gait is not None]
-    return [(one, near) for one, near in pairs if near is not None and abs(one.time_s - near.time_s) > EVENT_LIMIT_S]
+    pairs = [
+        (event, nearest_event(shown, event.of_gait, SAME_EVENT_S))
+        for event in trial.events
+        if event.of_gait is not None
+    ]
+    return [
+        (event, near) for event, near in pairs if near is not None and abs(event.time_s - near.time_s) > EVENT_LIMIT_S
+    ]
 
 
 def sides_exchanged(trial: Trial) -> bool:
@@ -252,19 +260,19 @@ def counted_from_first_frame(trial: Trial) -> bool:
     """
     edges, stated = load_edges(trial.loads), _stated(trial)
     first_s = float(trial.markers.time[0])
-    later = _agreeing([one._replace(time_s=one.time_s + first_s) for one in stated], edges)
+    later = _agreeing([event._replace(time_s=event.time_s + first_s) for event in stated], edges)
     return later > max(1, _agreeing(stated, edges), _agreeing(_exchanged(stated), edges))
 
 
 def events_of_other_foot(events: Iterable[FileEvent], shown: Sequence[GaitEvent]) -> list[FileEvent]:
     """Return the stated events that match the other foot at their times, but not their own foot."""
     wrong = []
-    for one in events:
-        if (stated := one.of_gait) is None:
+    for event in events:
+        if (stated := event.of_gait) is None:
             continue
         other = nearest_event(shown, stated._replace(side=_OTHER[stated.side]), _SAME_STEP_EVENT_S)
         if other is not None and nearest_event(shown, stated, SAME_EVENT_S) is None:
-            wrong.append(one)
+            wrong.append(event)
     return wrong
 
 
@@ -278,11 +286,11 @@ def usable_events(trial: Trial, by_motion: Sequence[GaitEvent]) -> list[GaitEven
 
 
 def _stated(trial: Trial) -> list[GaitEvent]:
-    return [one.of_gait for one in trial.events if one.of_gait is not None]
+    return [event.of_gait for event in trial.events if event.of_gait is not None]
 
 
 def _exchanged(events: Sequence[GaitEvent]) -> list[GaitEvent]:
-    return [one._replace(side=_OTHER[one.side]) for one in events]
+    return [event._replace(side=_OTHER[event.side]) for event in events]
 
 
 def _agreeing(events: Sequence[GaitEvent], edges: Sequence[GaitEvent]) -> int:

@@ -55,23 +55,23 @@ def selected(plates: PlateLoads, names: Sequence[str]) -> PlateLoads:
     """Return the plates of these names alone, in the order of the recording."""
     kept = [p for p, name in enumerate(plates.names) if name in names]
 
-    def own(values: Sequence[Any] | None) -> Any:
+    def of_kept(values: Sequence[Any] | None) -> Any:
         return None if values is None else tuple(values[p] for p in kept)
 
     torques = plates.torques and [
-        one._replace(belongs_to=kept.index(one.belongs_to) if one.belongs_to in kept else None)
-        for one in plates.torques
+        torque._replace(belongs_to=kept.index(torque.belongs_to) if torque.belongs_to in kept else None)
+        for torque in plates.torques
     ]
     return PlateLoads(
         plates.time,
-        own(plates.names),
+        of_kept(plates.names),
         plates.force[:, kept],
         plates.moment[:, kept],
-        own(plates.declared_feet),
+        of_kept(plates.declared_feet),
         None if plates.corners is None else plates.corners[kept],
-        own(plates.noise_n),
-        own(plates.unloaded),
-        own(plates.spikes),
+        of_kept(plates.noise_n),
+        of_kept(plates.unloaded),
+        of_kept(plates.spikes),
         None if torques is None else tuple(torques[p] for p in kept),
     )
 
@@ -79,15 +79,17 @@ def selected(plates: PlateLoads, names: Sequence[str]) -> PlateLoads:
 def with_plates_of_trial(recording: Recording) -> Recording:
     """Return the recording with plate names made unique to this trial, also in its findings."""
     findings = tuple(
-        replace(one, where=replace(one.where, plate=plate_of_trial(one.where.plate, recording.name)))
-        if one.where.plate is not None
-        else one
-        for one in recording.findings
+        replace(reported, where=replace(reported.where, plate=plate_of_trial(reported.where.plate, recording.name)))
+        if reported.where.plate is not None
+        else reported
+        for reported in recording.findings
     )
     plates = recording.plates
     if plates is not None:
         plates = replace(plates, names=tuple(plate_of_trial(name, recording.name) for name in plates.names))
-    stated = tuple(one._replace(plate=plate_of_trial(one.plate, recording.name)) for one in recording.stated_contacts)
+    stated = tuple(
+        contact._replace(plate=plate_of_trial(contact.plate, recording.name)) for contact in recording.stated_contacts
+    )
     return replace(recording, plates=plates, findings=findings, stated_contacts=stated)
 
 

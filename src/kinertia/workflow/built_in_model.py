@@ -114,7 +114,7 @@ def calibrate(
     free_axes = show_knee_axes(poses) if free_axes is None else free_axes
     elbows = elbow_rotations(model.skeleton, skeleton)
     skeleton, _ = lock_undetermined(skeleton, trials, poses, dict.fromkeys(ARM_COORDINATES, 0.0))
-    found = [one for trial in trials for one in labels_by_model(skeleton, trial)]
+    found = [found_labels for trial in trials for found_labels in labels_by_model(skeleton, trial)]
     everywhere = set(model.skeleton.labels).intersection(*(trial.markers.labels for trial in trials))
     skeleton, head = without_head(skeleton, acromia, everywhere)
     marker_sd = {s: UPPER_BODY_SD_M if s in _ARMS or s == "torso" else LOWER_BODY_SD_M for s in model.skeleton.segments}
@@ -200,7 +200,7 @@ def built_in_model(screened: Screened, trials: Sequence[RotatedTrial], settings:
     statics = [] if static is None else [static.static]
     subject = complete_subject(person.subject, [*statics, *person.recordings])
     height_m, sex = known(subject.height_m), known(subject.sex)
-    facing_x = [_turned(one, context.marker_set) for one in trials]
+    facing_x = [_turned(trial, context.marker_set) for trial in trials]
     landmarks = static or _stance_of(person, facing_x, context.marker_set)
     model = build_gait27(
         landmarks.static, landmarks.marker_set, height_m, sex, settings.hip_centre, by_stature=landmarks.of_walk
@@ -208,11 +208,11 @@ def built_in_model(screened: Screened, trials: Sequence[RotatedTrial], settings:
     model, facing_x = _with_trunk(model, facing_x)
     model = replace(model, skeleton=with_stated_ranges(model.skeleton, subject))
     stated_axes = _free_axes(facing_x, landmarks, settings)
-    calibrated = calibrate(model, [one.trial for one in facing_x], landmarks.acromia, stated_axes)
+    calibrated = calibrate(model, [rotated.trial for rotated in facing_x], landmarks.acromia, stated_axes)
     found = calibrated.findings
     left = _unblocked(facing_x, screened, [*screened.findings, *found])
     if len(left) < len(facing_x):  # the skeleton is adapted to those that are used
-        calibrated = calibrate(model, [one.trial for one in left], landmarks.acromia, stated_axes)
+        calibrated = calibrate(model, [rotated.trial for rotated in left], landmarks.acromia, stated_axes)
     body_kg = TotalMass.of(known(subject.mass_kg), person.attached).body_kg
     literature = literature_bsp(body_kg, height_m, sex, model.geometry, settings.bsp)
     return PersonModel(
@@ -234,12 +234,12 @@ def _stance_of(person: Person, trials: Sequence[RotatedTrial], marker_set: Marke
     Raises:
         TrialError: S208, it lacks landmarks of a leg that stands.
     """
-    walk = next(one.trial for one in trials if one.trial.loads.plates)
+    walk = next(trial.trial for trial in trials if trial.trial.loads.plates)
     pose = stance_pose(walk.markers, marker_set)
     if pose is None:
         hidden = ", ".join(hidden_landmarks(walk.markers, marker_set)) or "all of a leg in one frame"
         raise TrialError.found(walk.name, "S208", landmarks=Quantity(hidden))
-    measured = next(one for one in person.recordings if one.name == walk.name)
+    measured = next(recording for recording in person.recordings if recording.name == walk.name)
     static, named = with_widths(
         replace(measured, markers=pose, plates=None), person.recordings, marker_set, person.subject
     )
@@ -250,14 +250,14 @@ def _free_axes(trials: Sequence[RotatedTrial], landmarks: _Landmarks, settings: 
     """Return whether joint axes are to be estimated; None where the trials decide, by whether they show them."""
     if settings.joint_axes is not None:
         return settings.joint_axes
-    if landmarks.of_walk or any(not one.trial.loads.plates for one in trials):
+    if landmarks.of_walk or any(not trial.trial.loads.plates for trial in trials):
         return True
     return None if settings.method == "simultaneous" else False
 
 
 def _show_axes(landmarks: _Landmarks, trials: Sequence[RotatedTrial], calibrated: Calibrated) -> bool:
     """Decide whether the trials show joint axes, if that is not decided by a static trial and them."""
-    return not landmarks.of_walk or show_knee_axes(first_poses(calibrated.skeleton, [one.trial for one in trials]))
+    return not landmarks.of_walk or show_knee_axes(first_poses(calibrated.skeleton, [trial.trial for trial in trials]))
 
 
 def _uncertainty(calibrated: Calibrated, landmarks: _Landmarks, shown: bool) -> ModelUncertainty:
@@ -282,12 +282,12 @@ def _uncertainty(calibrated: Calibrated, landmarks: _Landmarks, shown: bool) -> 
 
 def _with_trunk(model: Gait27, trials: Sequence[RotatedTrial]) -> tuple[Gait27, list[RotatedTrial]]:
     """Return the model and its trials, with an upright trunk in trials that show too few trunk markers."""
-    lacking = [not shows_trunk(model.skeleton, one.trial) for one in trials]
+    lacking = [not shows_trunk(model.skeleton, trial.trial) for trial in trials]
     if any(lacking) and VIRTUAL_TRUNK[0] not in model.skeleton.markers:
         model = replace(model, skeleton=model.skeleton.with_markers([*model.skeleton.markers, *VIRTUAL_TRUNK]))
     return model, [
-        replace(one, trial=with_upright_trunk(model.skeleton, one.trial)) if lacks else one
-        for one, lacks in zip(trials, lacking, strict=True)
+        replace(rotated, trial=with_upright_trunk(model.skeleton, rotated.trial)) if lacks else rotated
+        for rotated, lacks in zip(trials, lacking, strict=True)
     ]
 
 
@@ -308,16 +308,16 @@ def _unblocked(trials: Sequence[RotatedTrial], screened: Screened, found: Sequen
     """
     findings = screened.overruled(found)
     stopped = screened.stopped_by(findings)
-    left = [one for one in trials if one.trial.name not in stopped]
-    if not any(one.trial.loads.plates for one in left):
+    left = [trial for trial in trials if trial.trial.name not in stopped]
+    if not any(rotated.trial.loads.plates for rotated in left):
         raise BlockedError(findings, blocking(findings))
     return left
 
 
-def _turned(one: RotatedTrial, marker_set: MarkerSet) -> RotatedTrial:
+def _turned(rotated: RotatedTrial, marker_set: MarkerSet) -> RotatedTrial:
     """Return the trial rotated to face +X."""
     try:
-        rotation, angle = facing(one.trial.markers, marker_set)
+        rotation, angle = facing(rotated.trial.markers, marker_set)
     except MarkerSetError as error:
-        raise TrialError(one.trial.name, str(error)) from error
-    return replace(one, trial=one.trial if angle == 0.0 else one.trial.rotated(rotation), angle_deg=angle)
+        raise TrialError(rotated.trial.name, str(error)) from error
+    return replace(rotated, trial=rotated.trial if angle == 0.0 else rotated.trial.rotated(rotation), angle_deg=angle)

@@ -74,7 +74,7 @@ class RecordingCheck:
             movements,
             check_plates(recording, context.feet),
             () if trial is None else tuple(trial.windows()),
-            tuple(one for one in findings if one.where.trial == context.name),
+            tuple(finding for finding in findings if finding.where.trial == context.name),
         )
 
     @property
@@ -151,10 +151,10 @@ class PersonCheck:
     def overview(self) -> Overview:
         """Summary of the findings."""
         trials = len(self.screened.person.trials) + len(
-            {one.where.trial for one in self.screened.person.unread if one.where.trial}
+            {finding.where.trial for finding in self.screened.person.unread if finding.where.trial}
         )
         left_out = self.screened.left_out
-        asked = [one for one in self.screened.context.trials if one.without_forces and one.name not in left_out]
+        asked = [trial for trial in self.screened.context.trials if trial.without_forces and trial.name not in left_out]
         return Overview(self.findings, self.screened.rules, trials - len(asked), left_out)
 
 
@@ -166,7 +166,7 @@ def check_person(person: Person) -> PersonCheck:
     """
     screened = screen(person)
     contexts = (*screened.context.standing, *screened.context.trials)
-    return PersonCheck(screened, tuple(RecordingCheck.of(one, screened.findings) for one in contexts))
+    return PersonCheck(screened, tuple(RecordingCheck.of(context, screened.findings) for context in contexts))
 
 
 def check_recording(
@@ -271,7 +271,9 @@ def files_by_name(
             raise _unpaired(forces, problem, "Give one file of markers with --forces")
         wanted = [replace(wanted[0], forces=forces)]
     if loads is not None:
-        having = [k for k, one in enumerate(wanted) if one.forces is not None] or list(range(len(wanted)))
+        having = [k for k, files_of_trial in enumerate(wanted) if files_of_trial.forces is not None] or list(
+            range(len(wanted))
+        )
         if len(having) != 1:
             problem = f"explains one trial's forces, but {len(having)} are given"
             raise _unpaired(loads, problem, "Check one trial at a time")
@@ -285,10 +287,12 @@ def _unpaired(path: Path, problem: str, action: str) -> FileError:
 
 def trial_names(wanted: Sequence[RecordingFiles]) -> list[str]:
     """Name recordings by their marker files, with as much of the path as distinguishes them."""
-    paths = [one.markers for one in wanted]
+    paths = [files_of_trial.markers for files_of_trial in wanted]
     names = [[path.stem, path.name, str(path)] for path in paths]
     times = [Counter(level) for level in zip(*names, strict=True)]
-    return [next((name for k, name in enumerate(each) if times[k][name] == 1), each[-1]) for each in names]
+    return [
+        next((name for k, name in enumerate(candidates) if times[k][name] == 1), candidates[-1]) for candidates in names
+    ]
 
 
 def unknown_kind(path: Path) -> FileError:
@@ -319,12 +323,14 @@ def read_files(
     statics: list[Recording] = []
     moving: list[Recording] = []
     if static is not None:
-        wanted = [one for one in wanted if one.markers != static] or wanted
+        wanted = [files_of_trial for files_of_trial in wanted if files_of_trial.markers != static] or wanted
         recording = unread.tried(partial(read_recording, static, standing=True), None)
         statics += [] if recording is None else [recording]
-    for k, (name, one) in enumerate(zip(trial_names(wanted), wanted, strict=True)):
+    for k, (name, files_of_trial) in enumerate(zip(trial_names(wanted), wanted, strict=True)):
         progress(k / len(wanted))
-        recording = unread.tried(partial(read_recording, one.markers, one.forces, one.loads), name)
+        recording = unread.tried(
+            partial(read_recording, files_of_trial.markers, files_of_trial.forces, files_of_trial.loads), name
+        )
         if recording is not None:
             by_data = static is None and stated.model is None
             stands = by_data and travel(recording.markers).kind == "stands still"
@@ -332,7 +338,7 @@ def read_files(
     unread.expect_any([*statics, *moving])
     return replace(
         stated,
-        trials=[TrialInput(one) for one in moving],
+        trials=[TrialInput(walk) for walk in moving],
         static=statics[0] if len(statics) == 1 else None,
         more_statics=statics if len(statics) > 1 else (),
         unread=tuple(unread.findings),

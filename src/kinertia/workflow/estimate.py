@@ -170,16 +170,16 @@ def _simultaneous(
     progress("estimate", 0.0)
     bandwidths = Bandwidth.of(ready.kinematics, settings.cutoff_hz, settings.force_cutoff_hz)
 
-    def fit(one: Prepared, otherwise: Sequence[Kinematics]) -> SimultaneousFit:
+    def fit(prepared: Prepared, otherwise: Sequence[Kinematics]) -> SimultaneousFit:
         return fit_simultaneous(
-            one.skeleton,
-            one.prior,
-            one.kinematics,
+            prepared.skeleton,
+            prepared.prior,
+            prepared.kinematics,
             bandwidths,
-            named_by_source(one),
+            named_by_source(prepared),
             lambda share: progress("estimate", share),
             otherwise,
-            one.functional,
+            prepared.functional,
             terms,
         )
 
@@ -279,8 +279,11 @@ def _trial_fit(
         "estimate": inverse_dynamics(after.skeleton, bsp, motion, delivered),
     }
     if not k.complete and curves is not None:
-        narrow, full = ({name: np.full_like(each, np.nan) for name, each in of.items()} for of in (narrow, full))
-        loads = {stage: each[inner] for stage, each in curves.forces.items()}
+        narrow, full = (
+            {name: np.full_like(load, np.nan) for name, load in loads_by_stage.items()}
+            for loads_by_stage in (narrow, full)
+        )
+        loads = {stage: load[inner] for stage, load in curves.forces.items()}
     deviations = after.deviations if curves is None else curves.deviations
     return TrialFit(
         kinematics=k,
@@ -333,7 +336,11 @@ def _interpolated(time: np.ndarray, q: np.ndarray) -> Motion:
 def _windows(k: Kinematics) -> list[Window]:
     """Return the measured windows of a trial, in parts over which the pelvis can be corrected."""
     wrench = k.foot_loads.sum(axis=1)
-    return [part for own in k.intervals for part in intervals(Window(k.time[own], k.motion.cut(own), wrench[own]))]
+    return [
+        part
+        for frames in k.intervals
+        for part in intervals(Window(k.time[frames], k.motion.cut(frames), wrench[frames]))
+    ]
 
 
 def _marker_errors(skeleton: Skeleton, kinematics: Kinematics, motion: Motion) -> np.ndarray:
@@ -357,9 +364,11 @@ def without_gains_of_missing_loads(ready: Prepared, fitted: SimultaneousFit) -> 
     A plate is incomplete where the estimate shows it, or where a foot extends beyond its edge and it seems to read too
     little: not where all plates of a trial do, since then the person weighs less. None if there is none.
     """
-    beyond = {one.where.plate for one in ready.findings if one.code == _BEYOND_EDGE}
+    beyond = {finding.where.plate for finding in ready.findings if finding.code == _BEYOND_EDGE}
     light = light_plates(fitted.posterior.instrument_errors)
-    incomplete = {one.plate for one in fitted.posterior.missing_loads} | {name for name in beyond & light if name}
+    incomplete = {missing_load.plate for missing_load in fitted.posterior.missing_loads} | {
+        name for name in beyond & light if name
+    }
     if not incomplete:
         return None
     instruments = replace(ready.uncertainty.instruments, incomplete=frozenset(incomplete))
@@ -368,12 +377,12 @@ def without_gains_of_missing_loads(ready: Prepared, fitted: SimultaneousFit) -> 
 
 def light_plates(errors: Sequence[CalibrationEntry]) -> set[str | None]:
     """Return the plates that read too little, in all trials or in one, by more than another plate there does."""
-    gains = [one for one in errors if one.quantity == GAIN]
+    gains = [error for error in errors if error.quantity == GAIN]
     light = set()
-    for one in gains:
-        others = [other for other in gains if other.trial == one.trial and other.plate != one.plate]
+    for gain in gains:
+        others = [other for other in gains if other.trial == gain.trial and other.plate != gain.plate]
         most = max(others, key=lambda other: other.value, default=None)
-        alone = most is None or most.value - one.value > INTERVAL_SD * float(np.hypot(one.sd, most.sd))
-        if one.found and one.value < 0.0 and alone:
-            light.add(one.plate)
+        alone = most is None or most.value - gain.value > INTERVAL_SD * float(np.hypot(gain.sd, most.sd))
+        if gain.found and gain.value < 0.0 and alone:
+            light.add(gain.plate)
     return light

@@ -63,12 +63,12 @@ def with_known_body(
     for (row, column), (value, sd) in measured.items():
         k = 10 * row + column
         segment, parameter = prior.mean.segments[row], PARAMETERS[column]
-        expected, own = prior.mean.table().ravel()[k], float(np.sqrt(prior.covariance[k, k]))
+        expected, expected_sd = prior.mean.table().ravel()[k], float(np.sqrt(prior.covariance[k, k]))
         unit = UNITS[column]
         stated = Quantity(value, unit, sd=sd)
         source = segments[segment].source or "no source given"
         found.append(_leans_on(f"{segment} {parameter}, {shown(stated)} +- {sd:.2g} ({source})"))
-        distance = abs(value - expected) / float(np.hypot(own, sd))
+        distance = abs(value - expected) / float(np.hypot(expected_sd, sd))
         if distance > KNOWN_BODY_SD:
             found.append(
                 finding(
@@ -76,7 +76,7 @@ def with_known_body(
                     Where(part=f"{segment} {parameter}"),
                     distance_sd=Quantity(distance, "1", limit=KNOWN_BODY_SD),
                     stated=stated,
-                    expected=Quantity(float(expected), unit, sd=own),
+                    expected=Quantity(float(expected), unit, sd=expected_sd),
                 )
             )
     if settings.masses_kept:
@@ -123,13 +123,13 @@ def _leaning_on(
 
 def _kept(prior: BspPrior, body: int, attached: Sequence[Attached]) -> dict[tuple[int, int], tuple[float, float]]:
     """Return masses and SDs of the body's (first) segments for masses that are to be kept, as `_measured` does."""
-    if unknown := [one.name for one in attached if one.mass_kg is None and one.on_scale]:
+    if unknown := [item.name for item in attached if item.mass_kg is None and item.on_scale]:
         raise PriorError(
             f"masses_kept = true under [prior], but {unknown[0]}, of unknown mass, was weighed with the person, so "
             "that the body's masses are not known either; weigh one of the two alone, or leave masses_kept out"
         )
     masses = zip(prior.mean.mass_kg[:body].tolist(), prior.sd[:body, 0].tolist(), strict=True)
-    return {(k, 0): (mass, _KEPT_SHARE * own) for k, (mass, own) in enumerate(masses)}
+    return {(k, 0): (mass, _KEPT_SHARE * share) for k, (mass, share) in enumerate(masses)}
 
 
 def _with_measures(
@@ -147,7 +147,7 @@ def _with_measures(
     prior, body = with_measures(prior, ready.skeleton, measures.values, body_kg, height_m, artificial, body_sd)
     found = [
         _leans_on(f"{len(measures.values)} of {len(all_measures())} girths and lengths from {measures.name}"),
-        *(one.in_file(measures.name) for one in body.findings),
+        *(reported.in_file(measures.name) for reported in body.findings),
     ]
     if abs(body.total_kg - body_kg) > KNOWN_BODY_SD * np.hypot(body.total_sd_kg, body_sd):
         yeadon = Quantity(body.total_kg, "kg", sd=body.total_sd_kg)
@@ -165,12 +165,12 @@ def _from_earlier(prior: BspPrior, earlier: BspTable) -> BspPrior:
         )
     rows = [earlier.segments.index(name) for name in names]
     held = ~earlier.sd[rows].any(axis=1, keepdims=True)
-    own = prior.sd.ravel()
+    prior_sd = prior.sd.ravel()
     sd = np.where(held, prior.sd, earlier.sd[rows]).ravel()
     return replace(
         prior,
         mean=BodySegmentParameters.from_table(names, np.where(held, prior.mean.table(), earlier.estimate[rows])),
-        covariance=prior.covariance / np.outer(own, own) * np.outer(sd, sd),
+        covariance=prior.covariance / np.outer(prior_sd, prior_sd) * np.outer(sd, sd),
     )
 
 
@@ -186,9 +186,9 @@ def with_prosthesis(prior: BspPrior, segment: str) -> BspPrior:
     factor = np.full(10, _PROSTHESIS_SPREAD)
     factor[0] = max(_PROSTHESIS_MASS_SD * prior.mean.mass_kg[row] / prior.sd[row, 0], 1.0)
     covariance = prior.covariance.copy()
-    own = covariance[rows, rows] * np.outer(factor, factor)
+    widened = covariance[rows, rows] * np.outer(factor, factor)
     covariance[rows, :] = covariance[:, rows] = 0.0
-    covariance[rows, rows] = own
+    covariance[rows, rows] = widened
     return replace(prior, covariance=covariance)
 
 

@@ -57,15 +57,15 @@ def with_attached(ready: Prepared, by_itself: Collection[str] = ()) -> Prepared:
     stated_mass_kg = known(ready.subject.mass_kg)
     skeleton, prior = with_attached_prior(ready.skeleton, ready.prior, ready.attached, stated_mass_kg, by_itself)
     # the literature's own body, which need not be the prior's mean, and fixed segments after all others
-    body, own = len(ready.prior.mean.segments), ready.literature
-    names = (*prior.mean.segments, *own.segments[body:])
-    table = np.concatenate([own.table()[:body], prior.mean.table()[body:], own.table()[body:]])
+    body, literature = len(ready.prior.mean.segments), ready.literature
+    names = (*prior.mean.segments, *literature.segments[body:])
+    table = np.concatenate([literature.table()[:body], prior.mean.table()[body:], literature.table()[body:]])
     return replace(
         ready,
         skeleton=skeleton,
         prior=prior,
         literature=BodySegmentParameters.from_table(names, table),
-        findings=(*ready.findings, *(_assumed(one, stated_mass_kg) for one in ready.attached)),
+        findings=(*ready.findings, *(_assumed(item, stated_mass_kg) for item in ready.attached)),
     )
 
 
@@ -88,31 +88,31 @@ def with_attached_prior(
         PriorError: no such segment, or a name that is taken.
     """
     _check(skeleton, attached)
-    joints = tuple(Joint(one.segment, one.name, np.eye(3), np.zeros(3), ()) for one in attached)
+    joints = tuple(Joint(item.segment, item.name, np.eye(3), np.zeros(3), ()) for item in attached)
     return replace(skeleton, joints=(*skeleton.joints, *joints)), _extended(prior, attached, stated_mass_kg, by_itself)
 
 
 def _check(skeleton: Skeleton, attached: Sequence[Attached]) -> None:
     taken = list(skeleton.segments)
-    for one in attached:
-        if one.segment not in skeleton.segments:
+    for item in attached:
+        if item.segment not in skeleton.segments:
             raise PriorError(
-                f"[[attached]] {one.name}: the model has no segment '{one.segment}'; it has "
+                f"[[attached]] {item.name}: the model has no segment '{item.segment}'; it has "
                 f"{', '.join(skeleton.segments)}"
             )
-        if one.name == _GROUND:
+        if item.name == _GROUND:
             raise PriorError(f"[[attached]] {_GROUND}: this is OpenSim's name for the laboratory; give it another name")
-        if one.name in taken:
-            raise PriorError(f"[[attached]] {one.name}: there is a segment of this name already; give it another")
-        taken.append(one.name)
+        if item.name in taken:
+            raise PriorError(f"[[attached]] {item.name}: there is a segment of this name already; give it another")
+        taken.append(item.name)
 
 
 def _extended(
     prior: BspPrior, attached: Sequence[Attached], stated_mass_kg: float, by_itself: Collection[str]
 ) -> BspPrior:
     """Extend the prior by attached items: the heavier an item weighed with the body, the lighter the body."""
-    tables, blocks = zip(*(_expected(one, *mass_of(one, stated_mass_kg)) for one in attached), strict=True)
-    names = (*prior.mean.segments, *(one.name for one in attached))
+    tables, blocks = zip(*(_expected(item, *mass_of(item, stated_mass_kg)) for item in attached), strict=True)
+    names = (*prior.mean.segments, *(item.name for item in attached))
     size = len(prior.covariance)
     covariance = np.zeros((10 * len(names),) * 2)
     covariance[:size, :size] = prior.covariance
@@ -126,9 +126,9 @@ def _extended(
             covariance[:size, rows] = sd_kg**2 * np.outer(less, more)
             covariance[rows, :size] = covariance[:size, rows].T
     mean = BodySegmentParameters.from_table(names, np.concatenate([prior.mean.table(), *tables]))
-    weighed = (*(True,) * len(prior.mean.segments), *(one.on_scale for one in attached))
+    weighed = (*(True,) * len(prior.mean.segments), *(item.on_scale for item in attached))
     # the body's own rows are for a person weighed without the items that were on the scale
-    on_scale = sum(mass_of(one, stated_mass_kg)[0] for one in attached if one.on_scale)
+    on_scale = sum(mass_of(item, stated_mass_kg)[0] for item in attached if item.on_scale)
     return replace(prior, mean=mean, covariance=covariance, mass_kg=prior.mass_kg + on_scale, weighed=weighed)
 
 
@@ -140,13 +140,13 @@ def _expected(attached: Attached, mass_kg: float, sd_kg: float) -> tuple[np.ndar
     else:
         second, own_sd = mass_kg / 12.0 * np.square(1e-3 * np.array(attached.size_mm)), SECOND_MOMENT_SD
     inertia = np.diag(second.sum() - second)
-    one = BodySegmentParameters(
+    body = BodySegmentParameters(
         (attached.name,), np.array([mass_kg]), 1e-3 * np.array([attached.com_mm]), inertia[None]
     )
-    table = one.table()
+    table = body.table()
     covariance = np.zeros((10, 10))
     covariance[1:4, 1:4] = np.square(1e-3 * attached.com_sd_mm) * np.eye(3)
-    covariance[4:, 4:] = (own_sd / SECOND_MOMENT_SD) ** 2 * inertia_covariance(one)[0]
+    covariance[4:, 4:] = (own_sd / SECOND_MOMENT_SD) ** 2 * inertia_covariance(body)[0]
     by_mass = _by_mass(table, mass_kg)
     return table, covariance + sd_kg**2 * np.outer(by_mass, by_mass)
 
@@ -178,13 +178,15 @@ def with_doubted_mass(prior: BspPrior, findings: Sequence[Finding]) -> BspPrior:
 
     They are not scaled to it. A user who ignores the finding keeps the stated mass.
     """
-    for one in findings:
-        if one.code != _DOUBTED or one.severity is not Severity.WARNING or not one.is_open:
+    for reported in findings:
+        if reported.code != _DOUBTED or reported.severity is not Severity.WARNING or not reported.is_open:
             continue
-        evidence = (one.evidence[name] for name in ("mass_by_force_kg", "stated_kg", "agreeing"))
-        by_force, stated, agreeing = (float(each.value) for each in evidence if not isinstance(each.value, tuple))
+        evidence = (reported.evidence[name] for name in ("mass_by_force_kg", "stated_kg", "agreeing"))
+        by_force, stated, agreeing = (
+            float(quantity.value) for quantity in evidence if not isinstance(quantity.value, tuple)
+        )
         if agreeing >= _FEWEST:
-            sd_kg = one.evidence["mass_by_force_kg"].sd or 0.0
+            sd_kg = reported.evidence["mass_by_force_kg"].sd or 0.0
             return prior.at_mass(prior.mass_kg + by_force - stated, max(prior.mass_sd_kg, sd_kg))
     return prior
 
@@ -207,17 +209,17 @@ def common_gain(errors: Sequence[CalibrationEntry]) -> tuple[float, float] | Non
     Args:
         errors: of instruments, significant or not.
     """
-    gains = [one for one in errors if one.quantity == GAIN]
-    gains = [one for one in gains if one.trial is not None] or gains
-    informed = [one for one in gains if not _uninformed(one)]
-    values = np.array([one.value for one in informed])
-    if len({one.plate for one in informed}) < _FEWEST_PLATES or not all(one.found for one in informed):
+    gains = [error for error in errors if error.quantity == GAIN]
+    gains = [gain for gain in gains if gain.trial is not None] or gains
+    informed = [gain for gain in gains if not _uninformed(gain)]
+    values = np.array([gain.value for gain in informed])
+    if len({gain.plate for gain in informed}) < _FEWEST_PLATES or not all(gain.found for gain in informed):
         return None
     least, most = float(np.abs(values).min()), float(np.abs(values).max())
     mean = float(values.mean())
     if abs(np.sign(values).sum()) < len(values) or least < _ALIKE * most or abs(mean) < _LEAST:
         return None
-    return mean, float(np.mean([one.sd for one in informed]))
+    return mean, float(np.mean([gain.sd for gain in informed]))
 
 
 def at_common_gain(prior: BspPrior, total_kg: float, gain: tuple[float, float]) -> BspPrior:
@@ -230,6 +232,9 @@ def at_common_gain(prior: BspPrior, total_kg: float, gain: tuple[float, float]) 
     return prior.at_mass(mass_kg, max(prior.mass_sd_kg, sd * mass_kg))
 
 
-def _uninformed(one: CalibrationEntry) -> bool:
+def _uninformed(calibration_entry: CalibrationEntry) -> bool:
     small, wide = _UNINFORMED
-    return abs(one.value) < small * one.prior_sd and one.sd > wide * one.prior_sd
+    return (
+        abs(calibration_entry.value) < small * calibration_entry.prior_sd
+        and calibration_entry.sd > wide * calibration_entry.prior_sd
+    )

@@ -47,7 +47,7 @@ def opensim_model(screened: Screened, trials: Sequence[RotatedTrial], model: Osi
     """
     person = screened.person
     subject = complete_subject(person.subject, person.recordings, mass_only=True)
-    measured = [one.trial for one in trials]
+    measured = [trial.trial for trial in trials]
     may_lock = {c.name: c.default for c in model.coordinates if c.name not in model.skeleton.coordinates[:6]}
     skeleton = with_stated_ranges(replace(model.skeleton, feet=_feet(model)), subject)
     poses = first_poses(skeleton, measured)
@@ -60,8 +60,8 @@ def opensim_model(screened: Screened, trials: Sequence[RotatedTrial], model: Osi
         skeleton, moved_m = adapted.skeleton, adapted.by_segment_m
         moved = list(moved_markers(model.skeleton, skeleton, [trial.markers for trial in measured]))
     body_kg = TotalMass.of(known(subject.mass_kg), person.attached).body_kg
-    own, factor = at_mass(model.bsp, body_kg)
-    prior, held = partition(skeleton, own)
+    filed, factor = at_mass(model.bsp, body_kg)
+    prior, held = partition(skeleton, filed)
     centres = {name: JOINT_CENTRE_SD_M for name in skeleton.locked if "/offset_" in name}
     return PersonModel(
         subject=subject,
@@ -73,7 +73,7 @@ def opensim_model(screened: Screened, trials: Sequence[RotatedTrial], model: Osi
             centres, MARKER_SD_M if person.calibrate else None, held, "the model's own values", moved_m=moved_m
         ),
         findings=moved,
-        assumed=_assumed(model, factor, own, idle, held),
+        assumed=_assumed(model, factor, filed, idle, held),
     )
 
 
@@ -81,14 +81,14 @@ def _feet(model: OsimModel) -> tuple[str, str]:
     """Return the heaviest body of each foot by name, which carries the ground reactions; there is one (O107)."""
     mass = dict(zip(model.bsp.segments, model.bsp.mass_kg.tolist(), strict=True))
     bodies = ([body for body in model.skeleton.segments if segment_of(body) == f"foot_{side}"] for side in "rl")
-    right, left = (max(own, key=mass.__getitem__) for own in bodies)
+    right, left = (max(feet_of_side, key=mass.__getitem__) for feet_of_side in bodies)
     return right, left
 
 
 def _assumed(
     model: OsimModel,
     factor: float,
-    own: BodySegmentParameters,
+    filed: BodySegmentParameters,
     idle: Sequence[str],
     held: BodySegmentParameters | None,
 ) -> list[Finding]:
@@ -96,7 +96,7 @@ def _assumed(
     file = Where(file=model.path.name)
     assumed = []
     if abs(factor - 1.0) >= MODEL_MASS_SHARE:
-        model_kg, stated_kg = (Quantity(one.total_mass_kg, "kg") for one in (model.bsp, own))
+        model_kg, stated_kg = (Quantity(body.total_mass_kg, "kg") for body in (model.bsp, filed))
         by = Quantity(factor, "1", limit=MODEL_MASS_SHARE)
         assumed.append(finding("O411", file, factor=by, model_kg=model_kg, stated_kg=stated_kg))
     values = {c.name: c.default for c in model.coordinates}
@@ -154,18 +154,18 @@ def at_mass(bsp: BodySegmentParameters, mass_kg: float) -> tuple[BodySegmentPara
     return scaled, factor
 
 
-def partition(skeleton: Skeleton, own: BodySegmentParameters) -> tuple[BspPrior, BodySegmentParameters | None]:
+def partition(skeleton: Skeleton, filed: BodySegmentParameters) -> tuple[BspPrior, BodySegmentParameters | None]:
     """Return a prior around the model's own parameters of bodies to be estimated, and the parameters of all others."""
-    estimated, rest = _split(skeleton, own)
+    estimated, rest = _split(skeleton, filed)
     prior = literature_prior(estimated, [kind_of(name) for name in estimated.segments])
-    prior = replace(prior, mass_sd_kg=SCALE_SD * own.total_mass_kg)
+    prior = replace(prior, mass_sd_kg=SCALE_SD * filed.total_mass_kg)
     return prior, rest if rest.segments else None
 
 
-def _split(skeleton: Skeleton, own: BodySegmentParameters) -> tuple[BodySegmentParameters, BodySegmentParameters]:
+def _split(skeleton: Skeleton, filed: BodySegmentParameters) -> tuple[BodySegmentParameters, BodySegmentParameters]:
     """Split the parameters into bodies to be estimated, and all others."""
-    chosen = estimated_bodies(skeleton, own)
-    estimated, rest = (_part(own, [n for n in own.segments if (n in chosen) == taken]) for taken in (True, False))
+    chosen = estimated_bodies(skeleton, filed)
+    estimated, rest = (_part(filed, [n for n in filed.segments if (n in chosen) == taken]) for taken in (True, False))
     return estimated, rest
 
 

@@ -228,7 +228,7 @@ class Solved:
     @property
     def without_forces(self) -> tuple[Kinematics, ...]:
         """Kinematics of the trials whose markers alone are used."""
-        return tuple(one for one in self.kinematics if not one.trial.loads.plates)
+        return tuple(kinematics for kinematics in self.kinematics if not kinematics.trial.loads.plates)
 
     @property
     def with_forces(self) -> Self:
@@ -237,9 +237,9 @@ class Solved:
         Raises:
             SettingsError: none is left.
         """
-        expect_forces([one.trial for one in self.kinematics])
+        expect_forces([kinematics.trial for kinematics in self.kinematics])
         rows = zip(self.kinematics, self.seconds, strict=True)
-        kept = [(one, seconds) for one, seconds in rows if one.trial.loads.plates]
+        kept = [(kinematics, seconds) for kinematics, seconds in rows if kinematics.trial.loads.plates]
         return replace(self, kinematics=tuple(k for k, _ in kept), seconds=tuple(seconds for _, seconds in kept))
 
 
@@ -269,16 +269,16 @@ def solved_trials(
         TrialError: no trial can be solved.
     """
     kinematics, seconds, failed = [], [], []
-    for done, one in enumerate(trials):
+    for done, rotated in enumerate(trials):
         progress("inverse kinematics", done / len(trials))
         started = time.perf_counter()
         try:
-            kinematics.append(solve_kinematics(skeleton, one.trial, one.angle_deg, smoothing))
+            kinematics.append(solve_kinematics(skeleton, rotated.trial, rotated.angle_deg, smoothing))
         except TrialError as error:
             failed.append(error)
             continue
         ik_s = time.perf_counter() - started
-        seconds.append({"read": one.read_seconds, "calibration": calibration_s, "ik": ik_s})
+        seconds.append({"read": rotated.read_seconds, "calibration": calibration_s, "ik": ik_s})
     reasons = [error.finding for error in failed if error.finding is not None]
     if failed and (not kinematics or len(reasons) < len(failed)):
         raise failed[0]

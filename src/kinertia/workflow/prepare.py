@@ -71,8 +71,8 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
     progress("calibration", 0.0)
     started = time.perf_counter()
     read_s = {item.recording.name: item.read_seconds for item in person.trials}
-    trials = [RotatedTrial(usable_trial(one), 0.0, read_s[one.name]) for one in usable]
-    expect_forces([one.trial for one in trials])
+    trials = [RotatedTrial(usable_trial(trial), 0.0, read_s[trial.name]) for trial in usable]
+    expect_forces([trial.trial for trial in trials])
     model = _model(screened, trials, settings)
     calibration_s = (time.perf_counter() - started) / len(model.trials)
     solved = solved_trials(model.skeleton, model.trials, settings.cutoff_hz, calibration_s, progress)

@@ -74,13 +74,13 @@ class Screened:
     @cached_property
     def stops(self) -> list[Finding]:
         """Open ERRORs that stop everything: of the person, the model or the static trial."""
-        names = {one.name for one in self.context.trials} | self._unread
-        return [one for one in blocking(self.findings) if one.where.trial not in names]
+        names = {trial.name for trial in self.context.trials} | self._unread
+        return [blocker for blocker in blocking(self.findings) if blocker.where.trial not in names]
 
     @property
     def _unread(self) -> set[str]:
         """Names of the trials that could not be read."""
-        return {one.where.trial for one in self.person.unread if one.where.trial is not None}
+        return {unread.where.trial for unread in self.person.unread if unread.where.trial is not None}
 
     @cached_property
     def left_out(self) -> tuple[str, ...]:
@@ -89,21 +89,30 @@ class Screened:
 
     def left_out_by(self, findings: Sequence[Finding]) -> tuple[str, ...]:
         """Return the names of the trials that cannot be used because of these findings."""
-        names = {one.where.trial for one in blocking(findings)}
+        names = {blocker.where.trial for blocker in blocking(findings)}
         return tuple(
-            dict.fromkeys([*sorted(self._unread), *(one.name for one in self.context.trials if one.name in names)])
+            dict.fromkeys(
+                [*sorted(self._unread), *(trial.name for trial in self.context.trials if trial.name in names)]
+            )
         )
 
     def stopped_by(self, findings: Sequence[Finding]) -> set[str | None]:
         """Return the names of the trials that these findings exclude."""
-        names = {one.name for one in self.markers_only}
-        return {one.where.trial for one in blocking(findings) if one.where.trial not in names or not _of_forces(one)}
+        names = {context.name for context in self.markers_only}
+        return {
+            blocker.where.trial
+            for blocker in blocking(findings)
+            if blocker.where.trial not in names or not _of_forces(blocker)
+        }
 
     def overruled(self, findings: Sequence[Finding]) -> list[Finding]:
         """Return findings, those here or more, with what explains and overrules each; what readers refuse stands."""
-        refused = {(one.code, one.where) for one in self.person.unread}
+        refused = {(unread.code, unread.where) for unread in self.person.unread}
         found = overruled(explained(findings), self.person.overrule, self.person.overrule_of)
-        return [replace(one, status="open") if (one.code, one.where) in refused else one for one in found]
+        return [
+            replace(reported, status="open") if (reported.code, reported.where) in refused else reported
+            for reported in found
+        ]
 
     @cached_property
     def usable(self) -> list[RecordingContext]:
@@ -112,7 +121,7 @@ class Screened:
         Raises:
             BlockedError: none is usable, or something stops everything.
         """
-        trials = [one for one in self.context.trials if one.name not in self.left_out]
+        trials = [trial for trial in self.context.trials if trial.name not in self.left_out]
         if self.stops or not trials:
             raise BlockedError(self.findings, blocking(self.findings))
         return [*trials, *self.markers_only]
@@ -130,7 +139,7 @@ def screen(person: Person) -> Screened:
     for trial in context.trials:
         found += _of_recording(trial, _motion_checks())
     unmatched = person.labels.finding if isinstance(person.labels, MarkerSetError) else None
-    if unmatched is not None and unmatched.code not in {one.code for one in found}:
+    if unmatched is not None and unmatched.code not in {reported.code for reported in found}:
         found.append(unmatched)
     found += _of_person(context, found)
     screened = Screened(person, context, ())
@@ -138,37 +147,46 @@ def screen(person: Person) -> Screened:
     markers_only = _markers_only(screened)
     if not markers_only:
         return screened
-    found += [one for trial in markers_only for one in complete_contact(trial)]
+    found += [reported for trial in markers_only for reported in complete_contact(trial)]
     return replace(screened, findings=tuple(screened.overruled(found)), markers_only=markers_only)
 
 
 def _markers_only(screened: Screened) -> tuple[RecordingContext, ...]:
     """Return the trials excluded for their forces alone, as trials without forces; none if no other trial has any."""
     context, left_out = screened.context, screened.left_out
-    if screened.stops or not any(not one.without_forces for one in context.trials if one.name not in left_out):
+    if screened.stops or not any(
+        not context_of_trial.without_forces
+        for context_of_trial in context.trials
+        if context_of_trial.name not in left_out
+    ):
         return ()
     against = blocking(screened.findings)
     markers_only = tuple(
-        replace(one, without_forces=True, forces_refused=True)
-        for one in context.trials
-        if one.name in left_out and all(_of_forces(each) for each in against if each.where.trial == one.name)
+        replace(context_of_trial, without_forces=True, forces_refused=True)
+        for context_of_trial in context.trials
+        if context_of_trial.name in left_out
+        and all(_of_forces(blocker) for blocker in against if blocker.where.trial == context_of_trial.name)
     )
     if not markers_only:
         return ()
-    names = {one.name for one in markers_only}
-    found = [one for one in screened.findings if one.where.trial not in names]
+    names = {context_of_trial.name for context_of_trial in markers_only}
+    found = [reported for reported in screened.findings if reported.where.trial not in names]
     for trial in markers_only:
         found += _of_recording(trial, _motion_checks())
-    trials = [one for one in context.trials if one.name not in names]
+    trials = [context_of_trial for context_of_trial in context.trials if context_of_trial.name not in names]
     found += _of_person(replace(context, trials=[*trials, *markers_only]), found)
-    more = [one for one in blocking(screened.overruled(found)) if one not in against]
-    bad = {one.where.trial for one in more}
-    return () if bad - names else tuple(one for one in markers_only if one.name not in bad)
+    more = [blocker for blocker in blocking(screened.overruled(found)) if blocker not in against]
+    bad = {blocker.where.trial for blocker in more}
+    return (
+        ()
+        if bad - names
+        else tuple(context_of_trial for context_of_trial in markers_only if context_of_trial.name not in bad)
+    )
 
 
-def _of_forces(one: Finding) -> bool:
+def _of_forces(blocker: Finding) -> bool:
     """Return whether a finding is about forces alone."""
-    return one.code.startswith(_OF_FORCES)
+    return blocker.code.startswith(_OF_FORCES)
 
 
 def person_context(person: Person) -> PersonContext:
@@ -201,7 +219,7 @@ def person_context(person: Person) -> PersonContext:
         for item in person.trials
     ]
     total = None if stated.mass_kg is None else _total(stated.mass_kg, person)
-    more_statics = [standing(one) for one in person.more_statics]
+    more_statics = [standing(further) for further in person.more_statics]
     return PersonContext(
         stated,
         trials,
@@ -230,23 +248,28 @@ def _total(mass_kg: float, person: Person) -> TotalMass | None:
 
 
 def _of_recording(context: RecordingContext, checks: Sequence[Check[RecordingContext]]) -> list[Finding]:
-    read = [one if one.where.trial is not None else one.in_trial(context.name) for one in context.recording.findings]
+    read = [
+        reported if reported.where.trial is not None else reported.in_trial(context.name)
+        for reported in context.recording.findings
+    ]
     return [*read, *asked(checks, context, read, context.name)]
 
 
 def _of_person(context: PersonContext, found: Sequence[Finding]) -> list[Finding]:
     """Check the person with the trials that are not blocked: another person's forces would contradict the mass."""
-    blocked = {one.where.trial for one in blocking(explained(found))}
-    sound = replace(context, trials=[one for one in context.trials if one.name not in blocked], found=tuple(found))
-    of_person = [one for one in found if one.where.trial is None]
-    return [_in_model(one, context) for one in asked(PERSON_CHECKS, sound, of_person)]
+    blocked = {blocker.where.trial for blocker in blocking(explained(found))}
+    sound = replace(
+        context, trials=[trial for trial in context.trials if trial.name not in blocked], found=tuple(found)
+    )
+    of_person = [reported for reported in found if reported.where.trial is None]
+    return [_in_model(reported, context) for reported in asked(PERSON_CHECKS, sound, of_person)]
 
 
-def _in_model(one: Finding, context: PersonContext) -> Finding:
+def _in_model(reported: Finding, context: PersonContext) -> Finding:
     """Add the model's file name to a finding about the OpenSim model itself."""
-    if context.model is None or one.where.trial is not None or not one.code.startswith("O"):
-        return one
-    return one.in_file(context.model.path.name)
+    if context.model is None or reported.where.trial is not None or not reported.code.startswith("O"):
+        return reported
+    return reported.in_file(context.model.path.name)
 
 
 def with_upright_static(person: Person) -> Person:
@@ -278,7 +301,7 @@ def with_model_spelling(person: Person) -> Person:
     if isinstance(marker_set, MarkerSetError) or (static is None and person.model is None):
         return person
     known = marker_set.labels if static is None or person.model is not None else static.markers.labels
-    trials = [replace(one, recording=_spelled(one.recording, marker_set, known)) for one in person.trials]
+    trials = [replace(trial, recording=_spelled(trial.recording, marker_set, known)) for trial in person.trials]
     return person if trials == [*person.trials] else replace(person, trials=trials)  # which would look for a set again
 
 
@@ -334,13 +357,13 @@ def without_computed_points(person: Person) -> Person:
     """
     if person.model is None or isinstance(person.labels, MarkerSetError):
         return person
-    trials = [replace(one, recording=_measured_only(one.recording, person.labels)) for one in person.trials]
+    trials = [replace(trial, recording=_measured_only(trial.recording, person.labels)) for trial in person.trials]
     return person if trials == [*person.trials] else replace(person, trials=trials)
 
 
 def _measured_only(recording: Recording, marker_set: MarkerSet) -> Recording:
     found = list(computed_points(recording, marker_set, Severity.CORRECTED))
-    computed = {label for one in found for label in one.where.markers}
+    computed = {label for reported in found for label in reported.where.markers}
     if not computed:
         return recording
     measured = [label for label in recording.markers.labels if label not in computed]

@@ -42,9 +42,9 @@ class SessionInstruments:
     def found(self) -> dict[str, dict[str, tuple[float, float, str]]]:
         """Error, SD and unit by instrument and quantity, in words and units for people."""
         found: dict[str, dict[str, tuple[float, float, str]]] = {}
-        for one in self.errors:
-            of_item = found.setdefault(item_text(one.kind, one.plate), {})
-            of_item[quantity_text(one.quantity, one.axis)] = one.value, one.sd, one.unit
+        for error in self.errors:
+            of_item = found.setdefault(item_text(error.kind, error.plate), {})
+            of_item[quantity_text(error.quantity, error.axis)] = error.value, error.sd, error.unit
         return found
 
 
@@ -89,13 +89,13 @@ def _errors(people: Sequence[PersonInstruments], stated: Instruments) -> tuple[C
     covariance = np.linalg.inv(shown.information + after.precision)
     mean = covariance @ (shown.rhs + after.pull)
     # a foot stands on the sum of plate error and common offset
-    to_plates, each = plates_with_floor(len(plates)), len(PLATE_ERRORS)
+    to_plates, per_plate = plates_with_floor(len(plates)), len(PLATE_ERRORS)
     values = to_plates @ mean[:-1]
     sd = np.sqrt(np.diag(to_plates @ covariance[:-1, :-1] @ to_plates.T))
-    rows = zip(values.reshape(-1, each), sd.reshape(-1, each), strict=True)
+    rows = zip(values.reshape(-1, per_plate), sd.reshape(-1, per_plate), strict=True)
     delay_s = float(mean[-1]), float(np.sqrt(covariance[-1, -1]))
     solved = laboratory_errors(dict(zip(plates, rows, strict=True)), delay_s, prior)
-    return tuple(one.entry for one in solved)
+    return tuple(error.entry for error in solved)
 
 
 def with_instruments(
@@ -113,24 +113,24 @@ def with_instruments(
         SessionError: none of the others stood on any of this person's plates.
     """
     others = [person for person in session if not set(person.files) & set(files)]
-    own = {plate for k in ready.kinematics for plate in k.trial.loads.plates}
+    of_person = {plate for k in ready.kinematics for plate in k.trial.loads.plates}
     theirs = {name for person in others for name in person.plates}
-    if others and not own & theirs:
+    if others and not of_person & theirs:
         raise SessionError(
             f"none of the session's plates ({', '.join(sorted(theirs))}) is among this person's "
-            f"({', '.join(sorted(own))}); plates are matched by name"
+            f"({', '.join(sorted(of_person))}); plates are matched by name"
         )
     prior = InstrumentPrior.stated(stated, [_information(person) for person in others])
     findings = ready.findings
     if session:
         left_out = [person.name for person in session if person not in others]
-        of = (
+        source = (
             f"plates and synchronisation are known from {_listed([p.name for p in others])}"
             if others
             else "nothing of others"
         )
         own_trials = f"; {_listed(left_out)} left out: the same files are in this fit" if left_out else ""
-        findings = (*findings, finding("S408", source=Quantity(f"session: {of}{own_trials}")))
+        findings = (*findings, finding("S408", source=Quantity(f"session: {source}{own_trials}")))
     return replace(ready, uncertainty=replace(ready.uncertainty, instruments=prior), findings=findings)
 
 

@@ -154,7 +154,7 @@ def _readable(path: Path) -> Any:
 def _plates(file: Any) -> tuple[list[dict[str, np.ndarray]], str]:
     """Return the loads on force plates, or none and the reason why ezc3d cannot compute them."""
     try:
-        return [_plate(one) for one in ezc3d.ezc3d.ForcePlatforms(file.c3d_swig).forcePlatforms()], ""
+        return [_plate(platform) for platform in ezc3d.ezc3d.ForcePlatforms(file.c3d_swig).forcePlatforms()], ""
     except Exception as error:
         return [], str(error)
 
@@ -193,8 +193,8 @@ def parameter_values(parameters: Any, group: str, name: str, default: Sequence[A
 def text_list(parameters: Any, group: str, name: str) -> list[str]:
     """Return a list of strings, with the entries that continue under other names."""
 
-    def entries(one: str) -> list[str]:
-        return [str(entry).strip() for entry in parameter_values(parameters, group, one)]
+    def entries(parameter: str) -> list[str]:
+        return [str(entry).strip() for entry in parameter_values(parameters, group, parameter)]
 
     return continued(entries, name)
 

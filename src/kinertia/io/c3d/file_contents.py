@@ -75,14 +75,14 @@ def file_events(parameters: Any, labels: Sequence[str] = ()) -> tuple[FileEvent,
     lists = [_texts(parameters, name, len(times)) for name in ("CONTEXTS", "LABELS", "SUBJECTS", "DESCRIPTIONS")]
     others = {label.split(":", 1)[0] for label in labels if ":" in label}
     person = person_among(text_list(parameters, "SUBJECTS", "NAMES"), others)
-    own = subjects_of_person(lists[2], person, others)
+    of_person = subjects_of_person(lists[2], person, others)
     events = []
     for (minutes, seconds), context, name, subject, description in zip(times, *lists, strict=True):
         label = name or context  # Motion Analysis writes "RHS" as the context
         side, kind = side_and_kind(context, label)
-        if subject in own and not description.startswith(OWN_METHOD):
+        if subject in of_person and not description.startswith(OWN_METHOD):
             events.append(FileEvent(float(_SECONDS_PER_MINUTE * minutes + seconds), side, label, subject, kind))
-    return tuple(sorted((one for one in events if np.isfinite(one.time_s)), key=lambda one: one.time_s))
+    return tuple(sorted((event for event in events if np.isfinite(event.time_s)), key=lambda event: event.time_s))
 
 
 def person_among(names: Sequence[str], others: Collection[str]) -> str:
@@ -174,25 +174,25 @@ def add_events(
         others: names of other people whose markers are in the file.
     """
     rows = _rows(section)
-    own = [row for row in rows if not row.description.startswith(OWN_METHOD)]
-    persons = subjects_of_person([row.subject for row in own], subject, others)
-    stated = [event for row in own if row.subject in persons and (event := row.of_gait) is not None]
+    of_file = [row for row in rows if not row.description.startswith(OWN_METHOD)]
+    persons = subjects_of_person([row.subject for row in of_file], subject, others)
+    stated = [event for row in of_file if row.subject in persons and (event := row.of_gait) is not None]
     new = [
         _Row(
-            _CONTEXTS[one.event.side],
-            _LABELS[one.event.kind],
-            OWN_METHOD + one.method,
+            _CONTEXTS[found.event.side],
+            _LABELS[found.event.kind],
+            OWN_METHOD + found.method,
             subject,
-            _ICONS[one.event.kind],
+            _ICONS[found.event.kind],
             0,
             0.0,
-            one.event.time_s,
+            found.event.time_s,
         )
-        for one in events
-        if nearest_event(stated, one.event, SAME_EVENT_S) is None
+        for found in events
+        if nearest_event(stated, found.event, SAME_EVENT_S) is None
     ]
-    if (new or len(own) < len(rows)) and len(own) + len(new) <= _MOST:
-        _put(section, [*own, *new])
+    if (new or len(of_file) < len(rows)) and len(of_file) + len(new) <= _MOST:
+        _put(section, [*of_file, *new])
         return len(new)
     return 0
 
@@ -266,7 +266,9 @@ def subject_data(path: Path, parameters: Any) -> SubjectData:
     if height is not None and not _within(height, _HEIGHT_M):
         found.append(_implausible(path, "stature", Quantity(height, "m")))
         height = unit = None
-    lengths, doubted = _lengths(path, {key: each for key, each in given.items() if key not in heights}, unit or "mm")
+    lengths, doubted = _lengths(
+        path, {key: length for key, length in given.items() if key not in heights}, unit or "mm"
+    )
     if height is not None or lengths:
         found.append(finding("F124", Where(path.name), unit=Quantity(unit or "mm")))
     return SubjectData(mass, height, lengths, [*found, *doubted])
@@ -322,15 +324,17 @@ def _lengths(
                 lengths[key] = value / _PER_METRE[stated or unit]
             continue
         units = [stated] if stated else [unit, *_PER_METRE]
-        fitting = [one for one in dict.fromkeys(units) if _within(value / _PER_METRE[one], _LIMITS_M[kind])]
+        fitting = [
+            candidate for candidate in dict.fromkeys(units) if _within(value / _PER_METRE[candidate], _LIMITS_M[kind])
+        ]
         if not fitting:
             doubted.append(_implausible(path, key, Quantity(value / _PER_METRE[stated or unit], "m")))
             continue
         lengths[key] = value / _PER_METRE[fitting[0]]
         assert measure is not None
         side = _SIDES_OF_BODY.get(measure[1] or measure[4] or "")
-        for own in [side] if side else ["R", "L"]:
-            lengths.setdefault(f"{own}{kind}", lengths[key])
+        for letter in [side] if side else ["R", "L"]:
+            lengths.setdefault(f"{letter}{kind}", lengths[key])
     return lengths, doubted
 
 

@@ -67,12 +67,12 @@ def add_analysis(section: ParameterSection, measures: Sequence[Measure], subject
         return
     lists: dict[str, Value] = {
         "USED": np.array([len(measures)], dtype=np.int16),
-        "NAMES": [one.name for one in measures],
+        "NAMES": [measure.name for measure in measures],
         "DESCRIPTIONS": [_OURS] * len(measures),
         "SUBJECTS": [subject] * len(measures),
-        "CONTEXTS": [one.context for one in measures],
-        "UNITS": [one.unit for one in measures],
-        "VALUES": np.array([one.value for one in measures], dtype=np.float32),
+        "CONTEXTS": [measure.context for measure in measures],
+        "UNITS": [measure.unit for measure in measures],
+        "VALUES": np.array([measure.value for measure in measures], dtype=np.float32),
     }
     for name, value in lists.items():
         section.put(_GROUP, name, value)
@@ -148,14 +148,14 @@ def frames_of(path: Path) -> C3dFrames:
     labels = _labels(parts)
     first = struct.unpack_from(f"{parts.order}H", parts.before, 6)[0]
     rate_hz = struct.unpack_from(f"{parts.order}f", parts.before, 20)[0]
-    each = parts.words[:, : 4 * parts.points].reshape(len(parts.words), parts.points, 4).astype(float)
-    seen = (each[..., 3] >= 0) & np.isfinite(each[..., :3]).all(axis=-1)
+    samples = parts.words[:, : 4 * parts.points].reshape(len(parts.words), parts.points, 4).astype(float)
+    seen = (samples[..., 3] >= 0) & np.isfinite(samples[..., :3]).all(axis=-1)
     stated = {kind: parts.section.get("POINT", f"{name}_UNITS") for kind, name in OUTPUT_TYPES.items()}
     units = {kind: str(texts[0]) for kind, texts in stated.items() if texts is not None and len(texts) and texts[0]}
     for kind, unit in units.items():
         if unit_factor(kind, unit) is None:
             raise FileError(path, f"cannot take model outputs: its {kind} are in '{unit}'")
-    return C3dFrames(content, tuple(labels), first, rate_hz, np.where(seen[..., None], each[..., :3], np.nan), units)
+    return C3dFrames(content, tuple(labels), first, rate_hz, np.where(seen[..., None], samples[..., :3], np.nan), units)
 
 
 def with_outputs(
@@ -163,7 +163,7 @@ def with_outputs(
     outputs: Sequence[OutputPoint],
     prefix: str,
     units: Mapping[str, str],
-    own: Mapping[str, tuple[Value, tuple[int, ...] | None]],
+    parameters: Mapping[str, tuple[Value, tuple[int, ...] | None]],
     events: Sequence[EventToWrite] = (),
     measures: Sequence[Measure] = (),
 ) -> bytes:
@@ -174,7 +174,7 @@ def with_outputs(
         outputs: with labels that no other point has.
         prefix: of labels, "Anna:"; empty for none.
         units: of the types, for a file that states none; omitted if other outputs have different units (`USUAL_UNITS`).
-        own: entries of the group KINERTIA by name: value, and shape as `ParameterSection.put` has it.
+        parameters: entries of the group KINERTIA by name: value, and shape as `ParameterSection.put` has it.
         events: events; those that the file lacks are added.
         measures: measures of strides, for a file that states none.
 
@@ -182,14 +182,14 @@ def with_outputs(
         TooManyParameters: they do not fit.
     """
     parts = _without_ours(_apart(frames.content))
-    section, labels = parts.section, [prefix + one.label for one in outputs]
+    section, labels = parts.section, [prefix + output.label for output in outputs]
     _put_list(section, "LABELS", [*_labels(parts), *labels])
     described = _listed(section, "DESCRIPTIONS")[: parts.points]
-    described += [""] * (parts.points - len(described)) + [one.description for one in outputs]
+    described += [""] * (parts.points - len(described)) + [output.description for output in outputs]
     _put_list(section, "DESCRIPTIONS", described)
     groups = list(_texts(section, "TYPE_GROUPS"))
     for kind, name in OUTPUT_TYPES.items():
-        ours = [label for label, one in zip(labels, outputs, strict=True) if one.kind == kind]
+        ours = [label for label, output in zip(labels, outputs, strict=True) if output.kind == kind]
         if not ours:
             continue
         already = _listed(section, kind)
@@ -201,7 +201,7 @@ def with_outputs(
     if groups:
         section.put("POINT", "TYPE_GROUPS", groups, (2, len(groups) // 2))
     _put_list(section, "LABELS", labels, OWN_GROUP)
-    for key, (value, shape) in own.items():
+    for key, (value, shape) in parameters.items():
         section.put(OWN_GROUP, key, value, shape)
     subject = subject_of(section, prefix.removesuffix(":"))
     others = {label.split(":", 1)[0] for label in frames.labels if ":" in label} - {subject}
@@ -209,7 +209,7 @@ def with_outputs(
     add_analysis(section, measures, subject)
     edited = [text for text in _texts(section, "EDITED", "MANUFACTURER") if not text.startswith(_EDITOR)]
     section.put("MANUFACTURER", "EDITED", [*edited, f"{_EDITOR}{VERSION}"])
-    return _together(parts, np.concatenate([_four(one.values) for one in outputs], axis=1))
+    return _together(parts, np.concatenate([_four(output.values) for output in outputs], axis=1))
 
 
 def _four(values: np.ndarray) -> np.ndarray:
@@ -294,7 +294,7 @@ def _texts(section: ParameterSection, name: str, group: str = "POINT") -> list[s
 
 def _listed(section: ParameterSection, name: str, group: str = "POINT") -> list[str]:
     """Read a list of texts that continues in NAME2, NAME3."""
-    return continued(lambda one: _texts(section, one, group), name)
+    return continued(lambda key: _texts(section, key, group), name)
 
 
 def _labels(parts: _Parts) -> list[str]:

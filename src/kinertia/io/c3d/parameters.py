@@ -125,8 +125,8 @@ class ParameterSection:
 
     def drop(self, group: str) -> None:
         """Remove a group and its entries."""
-        number = next((-one.group for one in self.records if one.group < 0 and one.name == group), None)
-        self.records = [one for one in self.records if abs(one.group) != number]
+        number = next((-record.group for record in self.records if record.group < 0 and record.name == group), None)
+        self.records = [record for record in self.records if abs(record.group) != number]
 
     def content(self) -> bytes:
         """Return the bytes of the section, in whole blocks.
@@ -135,8 +135,8 @@ class ParameterSection:
             TooManyParameters: it would need more than 255.
         """
         parts = []
-        for one in self.records:
-            parts += [one.head, struct.pack(f"{self.order}h", 2 + len(one.body)), one.body]
+        for record in self.records:
+            parts += [record.head, struct.pack(f"{self.order}h", 2 + len(record.body)), record.body]
         body = b"".join(parts) + b"\0\0"
         blocks = -(-(4 + len(body)) // _BLOCK)
         if blocks > _MOST_BLOCKS:
@@ -162,15 +162,17 @@ class ParameterSection:
         return struct.pack("bB", -1, len(sizes)) + bytes(sizes) + b"".join(text.ljust(width) for text in texts)
 
     def _find(self, group: str, name: str) -> int | None:
-        number = next((-one.group for one in self.records if one.group < 0 and one.name == group), None)
-        return next((k for k, one in enumerate(self.records) if one.group == number and one.name == name), None)
+        number = next((-record.group for record in self.records if record.group < 0 and record.name == group), None)
+        return next(
+            (k for k, record in enumerate(self.records) if record.group == number and record.name == name), None
+        )
 
     def _group(self, name: str) -> int:
         """Return the number of a group, which is created if missing."""
-        for one in self.records:
-            if one.group < 0 and one.name == name:
-                return -one.group
-        number = 1 + max((abs(one.group) for one in self.records), default=0)
+        for record in self.records:
+            if record.group < 0 and record.name == name:
+                return -record.group
+        number = 1 + max((abs(record.group) for record in self.records), default=0)
         encoded, description = name.encode("ascii"), _DESCRIPTIONS.get(name, "").encode("ascii")
         head = struct.pack("bb", len(encoded), -number) + encoded
         self.records.append(Record(-number, name, head, bytes([len(description)]) + description))

@@ -88,11 +88,11 @@ def _unit_of_matrix(platform: Any, unit: float, stated: float) -> float | None:
     corners, force = unit * platform["corners"].T, platform["force"].T
     loaded = np.linalg.norm(force, axis=1) > 5 * LOAD_THRESHOLD_N
     axes, half = plate_axes(corners), np.linalg.norm(corners[[0, 0]] - corners[[1, 3]], axis=1) / 2
-    for one in sorted((unit, stated), reverse=True):
-        about_middle = _moment(platform, 4, unit, one) - np.cross(corners.mean(axis=0), force)
+    for candidate in sorted((unit, stated), reverse=True):
+        about_middle = _moment(platform, 4, unit, candidate) - np.cross(corners.mean(axis=0), force)
         load, moment = force[loaded].sum(axis=0) @ axes, about_middle[loaded].sum(axis=0) @ axes
         if (np.abs([moment[1], moment[0]]) <= half * np.abs(load[2])).all():
-            return one
+            return candidate
     return None
 
 
@@ -120,8 +120,8 @@ def person_on_plates(platforms: Any, people: Sequence[str], labels: Sequence[str
         loaded = np.flatnonzero(np.linalg.norm(force, axis=1) > 5 * LOAD_THRESHOLD_N)
         distance = np.linalg.norm(positions[loaded] - platform["corners"].mean(axis=1), axis=2)
         for person in people:
-            own = [label.startswith(f"{person}:") for label in labels]
-            away[person].append(np.nan_to_num(distance[:, own], nan=np.inf).min(axis=1))
+            of_person = [label.startswith(f"{person}:") for label in labels]
+            away[person].append(np.nan_to_num(distance[:, of_person], nan=np.inf).min(axis=1))
     far = {person: float(np.median(np.concatenate(rows))) for person, rows in away.items() if any(map(len, rows))}
     nearest, *others = sorted(far, key=lambda person: far[person]) or [""]
     return nearest if others and far[nearest] < _MUCH_NEARER * far[others[0]] else ""

@@ -216,10 +216,10 @@ def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[F
     outputs = _outputs(file["parameters"], labels) - ours
     unnamed = [k for k, label in enumerate(labels) if not label or label.startswith("*")]
     kept = [k for k in range(len(labels)) if k not in set(unnamed) and labels[k] not in outputs | ours]
-    own = [labels[k] for k in kept]
-    people = list(people_among([label for label, k in zip(own, kept, strict=True) if seen[k]]))
-    on_plates = person_on_plates(file["data"].get("platform", []), people, own, positions[:, kept])
-    names, findings = without_prefixes(path, own, people[0] if len(people) == 1 else on_plates)
+    unread = [labels[k] for k in kept]
+    people = list(people_among([label for label, k in zip(unread, kept, strict=True) if seen[k]]))
+    on_plates = person_on_plates(file["data"].get("platform", []), people, unread, positions[:, kept])
+    names, findings = without_prefixes(path, unread, people[0] if len(people) == 1 else on_plates)
     if on_plates:
         who = {"person": Quantity(on_plates), "people": Quantity(", ".join(people))}
         findings.append(with_evidence("F162", Where(path.name), who))
@@ -308,6 +308,6 @@ def segment_points(labels: Sequence[str], points: FloatArray, ours: Set[str]) ->
 
 
 def _factor(parameters: Any, name: str) -> float | None:
-    kind, unit = next(one for one in OUTPUT_TYPES.items() if name.upper().endswith(one))
+    kind, unit = next(output_type for output_type in OUTPUT_TYPES.items() if name.upper().endswith(output_type))
     stated = str(parameter_values(parameters, "POINT", f"{unit}_UNITS", [""])[0]).strip()
     return unit_factor(kind, stated or USUAL_UNITS[kind])

@@ -58,7 +58,7 @@ class Poses:
 
     def scaled(self, unit_m: float) -> Poses:
         """Return the poses with translations in metres."""
-        return Poses(self.rotation, {name: unit_m * each for name, each in self.translation.items()}, self.heels_m)
+        return Poses(self.rotation, {name: unit_m * place for name, place in self.translation.items()}, self.heels_m)
 
     def inside(self, segment: str, child: str) -> FloatArray:
         """Return the position (3,) of the child's frame in that of the segment: median over the frames."""
@@ -142,4 +142,4 @@ def virtual_markers(poses: Poses, places: Mapping[str, tuple[str, FloatArray]]) 
         poses.translation[segment] + poses.rotation[segment] @ place if segment in poses.rotation else None
         for segment, place in places.values()
     ]
-    return np.stack([each for each in result if each is not None], axis=1)
+    return np.stack([place for place in result if place is not None], axis=1)

@@ -66,9 +66,9 @@ def _add_plates(file: Any, plates: PlateLoads, samples_per_frame: int) -> None:
     count, parameters = len(plates.names), file["parameters"]
     middle = plates.corners.mean(axis=1)
     about_middle = plates.moment - np.cross(middle, plates.force)
-    corners = [_ordered(_MM * each @ _TO_LAB.T) for each in plates.corners]
-    turns = np.array([plate_axes(each).T @ _TO_LAB for each in corners])
-    force, moment = (np.einsum("pij,kpj->kpi", turns, each) for each in (plates.force, _MM * about_middle))
+    corners = [_ordered(_MM * corner @ _TO_LAB.T) for corner in plates.corners]
+    turns = np.array([plate_axes(corner).T @ _TO_LAB for corner in corners])
+    force, moment = (np.einsum("pij,kpj->kpi", turns, component) for component in (plates.force, _MM * about_middle))
     channels = np.concatenate([force, moment], axis=-1)
     file["data"]["analogs"] = channels.reshape(1, len(plates.time), 6 * count).swapaxes(1, 2)
     parameters["ANALOG"]["RATE"]["value"] = [parameters["POINT"]["RATE"]["value"][0] * samples_per_frame]

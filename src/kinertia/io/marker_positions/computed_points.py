@@ -56,19 +56,23 @@ def unusable_points(markers: Markers) -> dict[str, str]:
     """Return label -> reason for points that are not on the body: ends of bone axes, copies, projections, constants."""
     found = _bone_axes(markers)
     place = _few_frames(markers)
-    for label, own in place.items():
-        if label not in found and (own == 0.0).all(axis=0).sum() >= 2:
+    for label, points in place.items():
+        if label not in found and (points == 0.0).all(axis=0).sum() >= 2:
             found[label] = "a number, no place"
     labels = [label for label in place if label not in found]
-    for one, other in combinations(labels, 2):
-        apart = place[other] - place[one]
-        if other in found or one in found or np.abs(apart[:, [0, 2]]).max() > _EXACT_M:
+    for first_label, other in combinations(labels, 2):
+        apart = place[other] - place[first_label]
+        if other in found or first_label in found or np.abs(apart[:, [0, 2]]).max() > _EXACT_M:
             continue
         if np.abs(apart[:, 1]).max() < _EXACT_M:
-            copy, original = (one, other) if is_named_virtual(one) and not is_named_virtual(other) else (other, one)
+            copy, original = (
+                (first_label, other)
+                if is_named_virtual(first_label) and not is_named_virtual(other)
+                else (other, first_label)
+            )
             found[copy] = f"the same point as {original}"
         else:
-            lower, upper = (one, other) if apart[:, 1].mean() > 0 else (other, one)
+            lower, upper = (first_label, other) if apart[:, 1].mean() > 0 else (other, first_label)
             if np.abs(place[lower][:, 1]).max() < _ON_FLOOR_M:
                 found[lower] = f"the point on the floor below {upper}"
     return found
@@ -82,19 +86,19 @@ def computed_points(markers: Markers) -> dict[str, str]:
     found = {label: "a computed point by its name" for label in markers.labels if is_named_virtual(label)}
     if len(next(iter(place.values()), ())) < _FEWEST:
         return found
-    for label, own in place.items():
+    for label, points in place.items():
         if label in found:
             continue
-        if pair := _middle_of(own, {other: at for other, at in place.items() if other != label}):
+        if pair := _middle_of(points, {other: at for other, at in place.items() if other != label}):
             found[label] = f"always midway between {pair[0]} and {pair[1]}"
     pairs = sides(list(place))
     hinted = {label: bool(roles(label, label in pairs)) for label in place}
     if markers.time[-1] - markers.time[0] > _LONG_S:  # within less, quiet markers keep their distances by chance
-        found |= _rigid_pairs({label: own for label, own in place.items() if label not in found}, hinted)
-    for label, own in place.items():
+        found |= _rigid_pairs({label: points for label, points in place.items() if label not in found}, hinted)
+    for label, points in place.items():
         others = {other: at for other, at in place.items() if other != label and other not in found}
-        sources = [] if label in found else _fixed_in(own, others)
-        if sources and not (hinted[label] and not all(hinted[one] for one in sources)):
+        sources = [] if label in found else _fixed_in(points, others)
+        if sources and not (hinted[label] and not all(hinted[source] for source in sources)):
             found[label] = f"fixed to {', '.join(sources)} within {_EXACT_M * 1e3:.1f} mm"
     return found
 
@@ -103,7 +107,9 @@ def _few_frames(markers: Markers) -> dict[str, FloatArray]:
     """Return label -> positions (f, 3) m in a few frames that show all markers but those with gaps."""
     share = markers.seen.mean(axis=0)
     for often in _OFTEN:
-        place = _in_common(markers, [label for label, own in zip(markers.labels, share, strict=True) if own > often])
+        place = _in_common(
+            markers, [label for label, label_share in zip(markers.labels, share, strict=True) if label_share > often]
+        )
         if len(next(iter(place.values()), ())) >= min(_FEWEST, len(markers.time)):
             return place
     return {}
@@ -111,10 +117,10 @@ def _few_frames(markers: Markers) -> dict[str, FloatArray]:
 
 def _in_common(markers: Markers, labels: Sequence[str]) -> dict[str, FloatArray]:
     """Return label -> positions (f, 3) m in at most `_FRAMES` of the frames that show all of these; empty if none."""
-    own = markers.select(labels)
-    frames = np.flatnonzero(own.seen.all(axis=1))
+    chosen = markers.select(labels)
+    frames = np.flatnonzero(chosen.seen.all(axis=1))
     frames = frames[:: -(-len(frames) // _FRAMES)] if len(frames) else frames
-    return {label: own.positions[frames, k] for k, label in enumerate(own.labels)} if len(frames) else {}
+    return {label: chosen.positions[frames, k] for k, label in enumerate(chosen.labels)} if len(frames) else {}
 
 
 def _bone_axes(markers: Markers) -> dict[str, str]:
@@ -139,7 +145,7 @@ def _bone_axes(markers: Markers) -> dict[str, str]:
         f"{side}{bone}"
         for side in "RL"
         for bone in _OXFORD
-        if all(f"{side}{one}{k}" in labels for one in _OXFORD[:2] for k in range(1, 4))
+        if all(f"{side}{letter}{k}" in labels for letter in _OXFORD[:2] for k in range(1, 4))
     ]
     families = [(f"{stem}_", "XYZ") for stem in {label[:-2] for label in labels if label.endswith(("_X", "_Y", "_Z"))}]
     families = [(stem, ends) for stem, ends in families if all(stem + end in labels for end in ends)]
@@ -148,12 +154,12 @@ def _bone_axes(markers: Markers) -> dict[str, str]:
     return found
 
 
-def _middle_of(own: FloatArray, place: dict[str, FloatArray]) -> tuple[str, str] | None:
+def _middle_of(points: FloatArray, place: dict[str, FloatArray]) -> tuple[str, str] | None:
     """Return two other points whose midpoint this point always is."""
     labels = list(place)
     others = np.stack([place[label] for label in labels])
     for k, label in enumerate(labels[:-1]):
-        off = np.abs((others[k] + others[k + 1 :]) / 2 - own).max(axis=(1, 2))
+        off = np.abs((others[k] + others[k + 1 :]) / 2 - points).max(axis=(1, 2))
         at = int(np.argmin(off))
         if off[at] < _EXACT_M:
             return label, labels[k + 1 + at]
@@ -172,18 +178,18 @@ def _rigid_pairs(place: dict[str, FloatArray], hinted: dict[str, bool]) -> dict[
     found: dict[str, str] = {}
     for a, b in zip(rows, columns, strict=True):
         if varies[a, b] < limit:
-            for one, other in ((labels[a], labels[b]), (labels[b], labels[a])):
-                if hinted[other] or not hinted[one]:
-                    found.setdefault(one, f"always equally far from {other}")
+            for constructed, other in ((labels[a], labels[b]), (labels[b], labels[a])):
+                if hinted[other] or not hinted[constructed]:
+                    found.setdefault(constructed, f"always equally far from {other}")
     return found if len(found) < _FEW * len(labels) else {}  # whole segments were made rigid
 
 
-def _fixed_in(own: FloatArray, place: dict[str, FloatArray]) -> Sequence[str]:
+def _fixed_in(points: FloatArray, place: dict[str, FloatArray]) -> Sequence[str]:
     """Return three other points in whose axes this point never moves although they move among themselves."""
-    near = sorted((float(np.linalg.norm(at - own, axis=1).mean()), other) for other, at in place.items())
+    near = sorted((float(np.linalg.norm(at - points, axis=1).mean()), other) for other, at in place.items())
     others = [other for distance, other in near if distance < _REACH_M][:_NEIGHBOURS]
     for three in combinations(others, 3):
-        corners = [place[one] for one in three]
+        corners = [place[corner] for corner in three]
         sides = [np.linalg.norm(a - b, axis=1).std() for a, b in combinations(corners, 2)]
         if min(sides) < _SKIN_M / 3:
             continue
@@ -196,7 +202,7 @@ def _fixed_in(own: FloatArray, place: dict[str, FloatArray]) -> Sequence[str]:
                 break
             z /= size
             axes = np.stack([x, np.cross(z, x), z], axis=1)
-            local = np.einsum("nij,nj->ni", axes, own - origin)
+            local = np.einsum("nij,nj->ni", axes, points - origin)
             if local.std(axis=0).max() < min(_EXACT_M / 3, 0.1 * min(sides)):
                 return three
     return ()
@@ -250,12 +256,12 @@ def _preset_roles() -> dict[str, frozenset[str]]:
     found: dict[str, set[str]] = {}
     for preset in map(read_marker_set, preset_names()):
         pairs = sides(preset.labels)
-        named = {label for own in preset.landmarks.values() for label in own}
+        named = {label for labels in preset.landmarks.values() for label in labels}
         entries = [*preset.landmarks.items(), *preset.segments.items()]
-        for entry, own in entries:
-            for label in own:
+        for entry, labels in entries:
+            for label in labels:
                 if entry in preset.segments and label in named:
                     continue
                 base = entry[:-2] if entry.endswith(("_r", "_l")) else entry
                 found.setdefault(_stem(label, label in pairs), set()).add(base)
-    return {stem: frozenset(own) for stem, own in found.items()}
+    return {stem: frozenset(stem_roles) for stem, stem_roles in found.items()}

@@ -142,14 +142,14 @@ def _back_of_pelvis(body: StandingBody, local: FloatArray, taken: tuple[int, int
 
 def _joints(body: StandingBody, found: Found, side: str) -> None:
     """Find lateral and medial markers of knee and ankle."""
-    asis = {one: body.outward[one][found.markers[f"asis_{one}"]] for one in "rl"}
+    asis = {leg: body.outward[leg][found.markers[f"asis_{leg}"]] for leg in "rl"}
     anchor = np.array([*((asis["r"] + asis["l"]) / 2)[:2], asis[side][2]])
     knees = _hinges(body, body.scores(KNEE_FROM_ASIS, side, anchor, "knee_lateral"), "knee", side, found)
     best: tuple[float, dict[str, tuple[int, float]]] = (0.0, {})
     for score, knee in knees:
         at = body.outward[side][knee[f"knee_lateral_{side}"][0]]
         ankles = _hinges(body, body.scores(ANKLE_FROM_KNEE, side, at, "ankle_lateral"), "ankle", side, found)
-        below, ankle = max(ankles, key=lambda one: one[0], default=(0.0, {}))
+        below, ankle = max(ankles, key=lambda candidate: candidate[0], default=(0.0, {}))
         if score + below > best[0]:
             best = (score + below, knee | ankle)
     for landmark, (marker, score) in best[1].items():
@@ -163,16 +163,16 @@ def _hinges(
     usual = INNER_KNEE if joint == "knee" else INNER_ANKLE
     taken = list(found.markers.values())
     hinges = []
-    for one in map(int, np.flatnonzero(outer > 0)):
-        if one in taken:
+    for lateral in map(int, np.flatnonzero(outer > 0)):
+        if lateral in taken:
             continue
-        own = {f"{joint}_lateral_{side}": (one, float(outer[one]))}
-        inner = body.scores(usual, side, body.outward[side][one], f"{joint}_medial")
-        inner[[one, *taken]] = -np.inf
+        hinge = {f"{joint}_lateral_{side}": (lateral, float(outer[lateral]))}
+        inner = body.scores(usual, side, body.outward[side][lateral], f"{joint}_medial")
+        inner[[lateral, *taken]] = -np.inf
         best = int(np.argmax(inner))
         if inner[best] > 0:
-            own[f"{joint}_medial_{side}"] = (best, float(inner[best]))
-        hinges.append((sum(score for _, score in own.values()), own))
+            hinge[f"{joint}_medial_{side}"] = (best, float(inner[best]))
+        hinges.append((sum(score for _, score in hinge.values()), hinge))
     return hinges
 
 
@@ -184,20 +184,22 @@ def _foot(body: StandingBody, found: Found, side: str) -> None:
     low[list(found.markers.values())] = False
     low &= np.isfinite(body.trust)
     ahead = low & (offsets[:, 0] > _FOREFOOT[0]) & (offsets[:, 0] < _FOREFOOT[1])
-    own = np.flatnonzero(low)
+    low_markers = np.flatnonzero(low)
     if not ahead.any():
         return
     toes = np.add(offsets[ahead].mean(axis=0), (0.0, 0.0, 0.02))  # the foot is on the inner side of the outer ankle
     turn = np.arctan2(toes[2], toes[0])
     c, s = np.cos(turn), np.sin(turn)
-    along = offsets[own] @ np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]).T
-    scores = {name: usual.score(along, 1.0) + body.named(name.split("_")[0])[own] for name, usual in FOOT.items()}
+    along = offsets[low_markers] @ np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]).T
+    scores = {
+        name: usual.score(along, 1.0) + body.named(name.split("_")[0])[low_markers] for name, usual in FOOT.items()
+    }
     wide = _assigned({name: score for name, score in scores.items() if name != "metatarsal_middle"})
     if not {"metatarsal_inner", "metatarsal_outer"} <= set(wide):
         narrow = _assigned({name: scores[name] for name in ("heel", "metatarsal_middle", "toe")})
         wide = narrow if "metatarsal_middle" in narrow else wide
     for name, row in wide.items():
-        found.add(f"{name}_{side}", int(own[row]), float(scores[name][row]))
+        found.add(f"{name}_{side}", int(low_markers[row]), float(scores[name][row]))
 
 
 def _assigned(scores: Mapping[str, FloatArray]) -> dict[str, int]:
@@ -215,9 +217,11 @@ def metatarsals(found: Mapping[str, int], side: str) -> tuple[list[int], str]:
         return [inner, outer], "midpoint of the medial and lateral metatarsal heads"
     if middle is not None:
         return [middle], "a central metatarsal head"
-    for one, which in ((inner, "inner"), (outer, "outer")):
-        if one is not None:
-            return [one], f"only a marker of the {which} metatarsal heads: the middle of the foot is a little beside it"
+    for head, which in ((inner, "inner"), (outer, "outer")):
+        if head is not None:
+            return [
+                head
+            ], f"only a marker of the {which} metatarsal heads: the middle of the foot is a little beside it"
     return [], ""
 
 
@@ -250,10 +254,10 @@ def _take(found: Found, landmark: str, scores: FloatArray) -> None:
 
 def _arm(body: StandingBody, found: Found, side: str, shoulder: FloatArray) -> None:
     """Find the elbow by its label and its distance from the shoulder; its medial side and the wrist by distance too."""
-    own = np.where(body.is_side(side), 0.0, -np.inf)
+    on_side = np.where(body.is_side(side), 0.0, -np.inf)
     from_shoulder = np.linalg.norm(body.places - shoulder, axis=1)
     elbow_scores = by_distance(from_shoulder, ELBOW_FROM_ACROMION, body.stature_m) + body.named("elbow_lateral") - FOUND
-    _take(found, f"elbow_lateral_{side}", elbow_scores + own)
+    _take(found, f"elbow_lateral_{side}", elbow_scores + on_side)
     if f"elbow_lateral_{side}" not in found.markers:
         return
     elbow = body.places[found.markers[f"elbow_lateral_{side}"]]
@@ -261,8 +265,8 @@ def _arm(body: StandingBody, found: Found, side: str, shoulder: FloatArray) -> N
     inner = by_distance(from_elbow, INNER_ELBOW, body.stature_m) + body.named("elbow_medial")
     along = (body.places - elbow) @ (elbow - shoulder) / np.linalg.norm(elbow - shoulder)
     inner -= 0.5 * np.square(along / (0.02 * body.stature_m))
-    _take(found, f"elbow_medial_{side}", inner + own - FOUND)
-    wrist = by_distance(from_elbow, WRIST_FROM_ELBOW, body.stature_m) + body.named("wrist") + own
+    _take(found, f"elbow_medial_{side}", inner + on_side - FOUND)
+    wrist = by_distance(from_elbow, WRIST_FROM_ELBOW, body.stature_m) + body.named("wrist") + on_side
     wrist[from_shoulder < from_elbow] = -np.inf
     _take(found, f"wrist_{side}", wrist)
     if f"wrist_{side}" in found.markers:
@@ -292,7 +296,7 @@ def segment_members(body: StandingBody, found: Found) -> dict[int, str]:
 
 def _trunk_or_leg(body: StandingBody, found: Mapping[str, int], side: str, marker: int) -> str:
     at, stature = body.outward[side][marker], body.stature_m
-    asis = {one: body.outward[one][found[f"asis_{one}"]] for one in "rl"}
+    asis = {leg: body.outward[leg][found[f"asis_{leg}"]] for leg in "rl"}
     middle, height = (asis["r"] + asis["l"]) / 2, (asis["r"][1] + asis["l"][1]) / 2
     above = (at[1] - height) / stature
     back = max(body.places[found[name]][1] for name in ("psis_r", "psis_l", "sacrum") if name in found)
@@ -305,7 +309,7 @@ def _trunk_or_leg(body: StandingBody, found: Mapping[str, int], side: str, marke
     knee, ankle = (found.get(f"{joint}_lateral_{side}") for joint in ("knee", "ankle"))
     if knee is None or ankle is None:
         return ""
-    joints = [body.outward[side][one] for one in (knee, ankle)]
+    joints = [body.outward[side][joint_marker] for joint_marker in (knee, ankle)]
     if at[1] > joints[0][1] + _KNEE_BAND * stature:
         return "thigh" if _beside(at, joints[0], asis[side], stature) else ""
     if at[1] > joints[0][1] - _KNEE_BAND * stature:
@@ -328,7 +332,7 @@ def _beside(at: FloatArray, lower: FloatArray, upper: FloatArray, stature: float
 def _arm_of(body: StandingBody, found: Mapping[str, int], side: str, marker: int) -> str:
     """Return the upper arm or the forearm where a marker is along one of them."""
     ends = [found.get(f"{name}_{side}") for name in ("acromion", "elbow_lateral", "wrist")]
-    known = [body.places[one] for one in ends if one is not None]
+    known = [body.places[arm_marker] for arm_marker in ends if arm_marker is not None]
     if len(known) < 3:
         return ""
     best = ("", _ARM_BREADTH * body.stature_m)
@@ -357,8 +361,8 @@ def wands(body: StandingBody, found: Found, members: Mapping[int, str]) -> dict[
                 marker: body.outward[side][marker][2]
                 - body.outward[side][lateral][2]
                 + WAND_BONUS_M * (f"{segment}_wand" in body.meant[marker])
-                for marker, own in members.items()
-                if own == f"{segment}_{side}"
+                for marker, segment_of_marker in members.items()
+                if segment_of_marker == f"{segment}_{side}"
                 and marker not in found.markers.values()
                 and np.isfinite(body.trust[marker])
             }

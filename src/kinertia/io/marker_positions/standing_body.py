@@ -136,7 +136,7 @@ class StandingBody:
 
     def named(self, landmark: str) -> FloatArray:
         """Return scores (m,) from labels and trust for a landmark (without its side)."""
-        return np.array([by_label(own, landmark) for own in self.meant]) + self.trust
+        return np.array([by_label(label_meanings, landmark) for label_meanings in self.meant]) + self.trust
 
     def scores(self, usual: Usual, side: str, anchor: FloatArray, landmark: str) -> FloatArray:
         """Return scores (m,) of all markers for a landmark of a side, from an anchor (3,) in lateral axes."""
@@ -180,7 +180,7 @@ def body_axes(points: FloatArray) -> BodyAxes:
     """
     best = min(_mirrored(points, angle) for angle in np.arange(0.0, 180.0, _STEP_DEG))
     near = best[1] + np.arange(-_STEP_DEG, _STEP_DEG + _FINE_DEG, _FINE_DEG)
-    cost, angle, offset = min(_mirrored(points, one) for one in near)
+    cost, angle, offset = min(_mirrored(points, near_angle) for near_angle in near)
     right = _direction(angle)
     forward = np.cross([0.0, 1.0, 0.0], right)
     middle = np.median(points, axis=0)
@@ -199,12 +199,12 @@ def _mirrored(points: FloatArray, angle_deg: float) -> tuple[float, float, float
     across = _direction(angle_deg)
     along = points @ across
     tree = cKDTree(points)
-    own = np.arange(len(points))[:, None]
+    index = np.arange(len(points))[:, None]
     best = (np.inf, angle_deg, 0.0)
     for offset in float(np.median(along)) + _OFFSETS_M:
         images = points - 2 * (along - offset)[:, None] * across
         distances, found = tree.query(images, k=2)
-        cost = np.minimum(np.where(found == own, np.inf, distances).min(axis=1), _UNMATCHED_M)
+        cost = np.minimum(np.where(found == index, np.inf, distances).min(axis=1), _UNMATCHED_M)
         cost[np.abs(along - offset) < _ON_PLANE_M] = _MIDDLE_M
         if cost.mean() < best[0]:
             best = (float(cost.mean()), angle_deg, float(offset))

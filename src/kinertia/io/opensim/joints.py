@@ -85,10 +85,10 @@ class Values:
 
     def property(self, element: Element, tag: str) -> Element | None:
         """Return the element's own property, or the one in the file's defaults."""
-        own = element.child(tag)
-        if own is None and element.tag in self.defaults:
+        stated = element.child(tag)
+        if stated is None and element.tag in self.defaults:
             return self.defaults[element.tag].child(tag)
-        return own
+        return stated
 
     def text(self, element: Element, tag: str) -> str:
         """Read the text of a property, without surrounding blanks; empty where it is left out."""

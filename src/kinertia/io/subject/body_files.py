@@ -39,8 +39,10 @@ def measures_sheet() -> str:
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(COLUMNS)
-    for one in sorted(measures(), key=lambda one: not one.first):
-        table.writerow([one.name, one.level, one.what, "", f"{100 * one.sd_m:g}", "yes" if one.first else ""])
+    for measure in sorted(measures(), key=lambda measure: not measure.first):
+        table.writerow(
+            [measure.name, measure.level, measure.what, "", f"{100 * measure.sd_m:g}", "yes" if measure.first else ""]
+        )
     return text.getvalue()
 
 
@@ -55,7 +57,7 @@ def read_measures(path: Path) -> BodyMeasures:
     Raises:
         FileError: no such file, an unknown measure or one twice, no value at all, or an impossible one; with the line.
     """
-    known = {one.name: one for one in measures()}
+    known = {measure.name: measure for measure in measures()}
     values: dict[str, tuple[float, float]] = {}
     for row in read_csv(path, _NEEDED, "the sheet of kinertia init --measures"):
         name = row.cells["measure"]

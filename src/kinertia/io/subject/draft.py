@@ -187,11 +187,13 @@ def _expect_files(folder: Path) -> list[Path]:
             raise FileError.found(file, "F192", name=Quantity(ascii(file.name)), problem=reason)
     if not any(map(is_capture, files)):
         problem = f"holds no file of markers ({', '.join(MARKER_FILES)})"
-        inside = [one for file in files for one in (file, *_entries(file)) if any(map(is_capture, _entries(one)))]
+        inside = [entry for file in files for entry in (file, *_entries(file)) if any(map(is_capture, _entries(entry)))]
         if len(inside) == 1:
             problem += f", but its folder {_relative(inside[0], folder)} does; give that one"
         elif inside:
-            listed = ", ".join(_relative(one, folder) for one in inside[:_LISTED]) + (", ..." * (len(inside) > _LISTED))
+            listed = ", ".join(_relative(capture, folder) for capture in inside[:_LISTED]) + (
+                ", ..." * (len(inside) > _LISTED)
+            )
             problem += f", but its folders {listed} do; give one person's folder, with the static trial"
         action = Quantity("Give a folder with the recordings of one person")
         raise FileError.found(folder, "F108", problem=Quantity(problem), action=action)
@@ -299,7 +301,7 @@ def _here_or_near(folder: Path, files: Sequence[Path], holds: Callable[[Path], b
     own, which may be another person's, and results of Kinertia are left out.
     """
     holding = [file for file in files if holds(file)]
-    of_forces = [one for one in _entries(folder.parent.parent) if _FORCE_NAME.search(one.name)]
+    of_forces = [entry for entry in _entries(folder.parent.parent) if _FORCE_NAME.search(entry.name)]
     for near in ([*files, *_entries(folder.parent)], of_forces):
         for other in near if not holding else ():
             inside = [file for file in _entries(other) if file.is_file()]
@@ -312,12 +314,12 @@ def _here_or_near(folder: Path, files: Sequence[Path], holds: Callable[[Path], b
 def _models_near(folder: Path) -> list[Path]:
     """Return OpenSim models of the folders beside this one, where AddBiomechanics and OpenCap put them."""
     beside = _entries(folder.parent)
-    places = [*beside, *(inner for one in beside if one.name == "OpenSimData" for inner in _entries(one))]
+    places = [*beside, *(inner for entry in beside if entry.name == "OpenSimData" for inner in _entries(entry))]
     return [
         file
-        for one in places
-        if one.name.lower().startswith("model")
-        for file in _entries(one)
+        for place in places
+        if place.name.lower().startswith("model")
+        for file in _entries(place)
         if file.suffix == ".osim"
     ]
 
@@ -381,9 +383,9 @@ def matched_by_name(wanting: Sequence[Path], offered: Sequence[Path]) -> dict[Pa
     scores = {}
     for wants in wanting:
         for offers in offered:
-            one, other = wants.stem.lower(), offers.stem.lower()
-            matcher = difflib.SequenceMatcher(None, one, other, autojunk=False)
-            scores[wants, offers] = (_has_word(other, one), matcher.find_longest_match().size, matcher.ratio())
+            wanted, other = wants.stem.lower(), offers.stem.lower()
+            matcher = difflib.SequenceMatcher(None, wanted, other, autojunk=False)
+            scores[wants, offers] = (_has_word(other, wanted), matcher.find_longest_match().size, matcher.ratio())
     least = 0 if len(wanting) == len(offered) == 1 else 4
     pairs: dict[Path, Path] = {}
     for (wants, offers), score in sorted(scores.items(), key=lambda item: item[1], reverse=True):

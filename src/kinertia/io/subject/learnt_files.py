@@ -101,8 +101,8 @@ def population_text(population: PopulationFile) -> str:
     spread = np.sqrt(np.diag(np.array(population.covariance)))
     names = [f"{segment} {parameter}" for segment in population.segments for parameter in PARAMETERS]
     lines += [
-        f"# {name:20s} {mean:+6.2f} +- {sd:4.2f}   {each:4.2f}"
-        for name, mean, sd, each in zip(names, population.mean, population.mean_sd, spread.tolist(), strict=True)
+        f"# {name:20s} {mean:+6.2f} +- {sd:4.2f}   {body_sd:4.2f}"
+        for name, mean, sd, body_sd in zip(names, population.mean, population.mean_sd, spread.tolist(), strict=True)
     ]
     lines += ["", f"kinertia = {json.dumps(population.kinertia)}"]
     lines += [

@@ -96,7 +96,7 @@ def read_trial(wanted: SubjectFile, files: TrialFiles) -> TrialInput:
     seconds = time.perf_counter() - started
     _expect_plates(read, wanted.instruments.plates or (), "[instruments] plates")
     recording = _as_used(wanted, read.without_markers(files.leave_out))
-    _expect_plates(recording, [one.plate for one in files.feet], "[[trial]] feet")
+    _expect_plates(recording, [contact.plate for contact in files.feet], "[[trial]] feet")
     recording = replace(
         recording, name=files.name, belt=read_belt(files.belt_speed_m_s), stated_contacts=tuple(files.feet)
     )

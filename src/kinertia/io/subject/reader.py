@@ -133,7 +133,9 @@ def read_subject(path: str | Path, to_fit: bool = True) -> SubjectFile:
 
 def _of_study(folder: Path) -> Diagnostics:
     """Return what the nearest `kinertia.toml` overrules, in the folder or in one above it."""
-    path = next((one / STUDY_FILE for one in (folder, *folder.parents) if os.path.isfile(one / STUDY_FILE)), None)
+    path = next(
+        (parent / STUDY_FILE for parent in (folder, *folder.parents) if os.path.isfile(parent / STUDY_FILE)), None
+    )
     if path is None:
         return Diagnostics()
     return _validated(StudyFile, read_toml(path, f"a study file ({STUDY_FILE})"), path).diagnostics
@@ -144,11 +146,11 @@ def _validated(kind: type[T], document: TomlFile, path: Path) -> T:
         return kind.model_validate(document.content, context={"folder": path.parent})
     except ValidationError as error:
         # a trial with an error in it does not count, so that pydantic also finds too few trials
-        errors = [one for one in error.errors() if one["type"] != "too_short" or not one["input"]]
+        errors = [problem for problem in error.errors() if problem["type"] != "too_short" or not problem["input"]]
         # a key that is not known explains one that is missing
-        errors = [one for one in errors if one["type"] == "extra_forbidden"] or errors
-        lines = [(document.line(one["loc"]) or document.last_line, _finding(one)) for one in errors]
-        first, *others = sorted(lines, key=lambda one: (one[0], one[1].message))
+        errors = [problem for problem in errors if problem["type"] == "extra_forbidden"] or errors
+        lines = [(document.line(problem["loc"]) or document.last_line, _finding(problem)) for problem in errors]
+        first, *others = sorted(lines, key=lambda line: (line[0], line[1].message))
         refusal = FileError.of(path, first[1], first[0])
         if first[1].code == _NOT_FOUND:  # where a folder was moved, all of its files are missing
             refusal.also = tuple(FileError.of(path, found, line) for line, found in others if found.code == _NOT_FOUND)
@@ -189,8 +191,8 @@ def _incomplete(wanted: SubjectFile, needs_sex: bool = True) -> tuple[Location, 
 def _no_sex(wanted: SubjectFile) -> Finding:
     """Return the finding that the sex is missing, and what else is, where no C3D file may state it."""
     found = _finding({"loc": ("subject", "sex"), "type": "missing"})
-    files = [wanted.model.static, *(one.markers for one in wanted.trials)]
-    if any(one is not None and one.suffix.lower() == ".c3d" for one in files):
+    files = [wanted.model.static, *(trial.markers for trial in wanted.trials)]
+    if any(file is not None and file.suffix.lower() == ".c3d" for file in files):
         return found
     more = [key for key in ("mass_kg", "height_m") if getattr(wanted.subject, key) is None]
     if not more:
@@ -223,8 +225,8 @@ def _two_models(
     return None
 
 
-def _conflict(one: str, other: str) -> Finding:
-    return finding("F193", one=Quantity(one), other=Quantity(other))
+def _conflict(key: str, other: str) -> Finding:
+    return finding("F193", one=Quantity(key), other=Quantity(other))
 
 
 def with_settings(wanted: SubjectFile, **values: Any) -> SubjectFile:

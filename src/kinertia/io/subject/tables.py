@@ -92,7 +92,7 @@ def _one_belt_speed(value: object) -> float:
 def _stated_contacts(value: object) -> tuple[StatedContact, ...]:
     if not isinstance(value, list | tuple) or not value:
         raise ValueError(_CONTACT)
-    return tuple(one if isinstance(one, StatedContact) else _stated_contact(one) for one in value)
+    return tuple(contact if isinstance(contact, StatedContact) else _stated_contact(contact) for contact in value)
 
 
 def _stated_contact(value: object) -> StatedContact:
@@ -276,9 +276,9 @@ def subject_text(content: Mapping[str, Any], heading: str) -> str:
                 lines += ["", f"[segment.{_key(segment)}]", *_entries(KnownSegment, entries)]
         elif isinstance(value, Mapping):
             lines += ["", f"[{_key(name)}]", *_entries(TABLES.get(name), value)]
-        elif isinstance(value, list) and value and all(isinstance(one, Mapping) for one in value):
-            for one in value:
-                lines += ["", f"[[{_key(name)}]]", *_entries(TABLES.get(name), one)]
+        elif isinstance(value, list) and value and all(isinstance(entry, Mapping) for entry in value):
+            for entry in value:
+                lines += ["", f"[[{_key(name)}]]", *_entries(TABLES.get(name), entry)]
         else:  # tables come after all plain entries
             lines.insert(1, f"{_key(name)} = {_value(value)}")
     return "\n".join([*lines, ""])
@@ -305,7 +305,7 @@ def _key(key: str) -> str:
 def _value(value: object) -> str:
     match value:
         case Mapping():
-            return "{ " + ", ".join(f"{_key(key)} = {_value(one)}" for key, one in value.items()) + " }"
+            return "{ " + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items()) + " }"
         case list() | tuple():
             return "[" + ", ".join(map(_value, value)) + "]"
         case bool():

@@ -55,14 +55,14 @@ def read_qualisys(path: str | Path, forces: Sequence[Path] | None = None) -> Rec
         _expect_alike(beside, single_plates)
         time = markers.time[0] + np.arange(len(single_plates[0].force)) / single_plates[0].rate_hz
         plates = LabPlates(
-            tuple(one.name for one in single_plates),
-            np.stack([one.force for one in single_plates], axis=1),
-            np.stack([one.moment for one in single_plates], axis=1),
-            np.stack([one.corners for one in single_plates]),
+            tuple(plate.name for plate in single_plates),
+            np.stack([plate.force for plate in single_plates], axis=1),
+            np.stack([plate.moment for plate in single_plates], axis=1),
+            np.stack([plate.corners for plate in single_plates]),
         )
     rotation, up, axis_findings = to_ground(path, "+Z", "Qualisys' usual setting", markers.positions, plates)
     ground, load_findings = to_ground_plates(path, plates, rotation, time)
-    more = [one for plate in single_plates for one in plate.findings]
+    more = [finding for plate in single_plates for finding in plate.findings]
     return Recording(
         path.stem,
         markers.rotated(rotation),

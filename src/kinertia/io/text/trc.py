@@ -175,7 +175,7 @@ def _labels(path: Path, lines: list[str], count: int) -> tuple[str, ...]:
     line = lines[3].strip()
     ways = (line.split("\t"), re.split(r"\t|\s{2,}", line), line.split())
     by_tab, *by_blanks = (tuple(cell.strip() for cell in cells if cell.strip())[2:] for cells in ways)
-    labels = by_tab or next((own for own in by_blanks if len(own) == count), by_blanks[-1])
+    labels = by_tab or next((split for split in by_blanks if len(split) == count), by_blanks[-1])
     if not labels:
         raise FileError.found(path, "F164", 4, found=Quantity("the row of labels is empty"))
     return labels

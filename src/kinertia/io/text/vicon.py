@@ -226,7 +226,7 @@ _TURNS = [
 def _in_lab_axes(force: FloatArray, moment: FloatArray, point: FloatArray) -> tuple[FloatArray, PlateMoments, bool]:
     """Return force and moments in the axes of the centre of pressure, and whether they were rotated to them."""
     tried = [PlateMoments.of(force @ turn.T, moment @ turn.T, point) for turn in _TURNS]
-    best = int(np.argmin([one.mismatch for one in tried]))
+    best = int(np.argmin([candidate.mismatch for candidate in tried]))
     if not np.isfinite(tried[best].mismatch):
         return force, tried[0], False
     if tried[best].mismatch > _MUCH_BETTER * tried[0].mismatch:

@@ -282,7 +282,7 @@ def _by_mass(fit: Fit) -> _Colours:
         percent,
         (-reach, reach),
         (BLUE, "#FFFFFF", VERMILION),
-        f"change of mass against {start_of(fit).of} (%)",
+        f"change of mass against {start_of(fit).phrase} (%)",
         texts,
         f"The body from the right, the front and the left, coloured by change of mass. {'; '.join(texts)}.",
     )

@@ -89,7 +89,7 @@ def change_figure(fit: Fit, columns: Sequence[int] = MAIN, truth: BodySegmentPar
             traces.append(_dots(away / scale, np.arange(len(shown)), texts) | {"marker": look, "name": "truth"})
         panels.append(Panel(f"{NAMES[k]} ({unit})", traces, (), rows))
     bars = "without error bars" if posterior is None else "with 95 % intervals before and after"
-    alt = f"Change against {start.of} by the estimate, {bars}: {', '.join(NAMES[k] for k in columns)}."
+    alt = f"Change against {start.phrase} by the estimate, {bars}: {', '.join(NAMES[k] for k in columns)}."
     return small_multiples(panels, alt, {"nticks": 5}, row_px=230, left_px=112, linked=False)
 
 
@@ -104,11 +104,11 @@ def departure_figure(fit: Fit, columns: Sequence[int] = MAIN) -> Figure | None:
     part = np.ix_(shown, np.array(columns))
     away, half = away[part], (INTERVAL_SD * posterior.sd / scale)[part]
     reach = max(3.0, float((np.abs(away) + half).max()) + 0.2)
-    title = {"text": f"prior SDs from {start.of}", "font": {"size": 11}, "standoff": 2}
+    title = {"text": f"prior SDs from {start.phrase}", "font": {"size": 11}, "standoff": 2}
     alt = (
         f"95 % intervals before and after the estimate in prior SDs: {', '.join(NAMES[k] for k in columns)}; "
         f"{int((np.abs(away) > DEPARTURE_SD).sum())} of {int((posterior.prior_sd[part] > 0).sum())} estimates lie more "
-        f"than {DEPARTURE_SD:g} prior SDs from {start.of}."
+        f"than {DEPARTURE_SD:g} prior SDs from {start.phrase}."
     )
     axis = {"range": [-reach, reach], "title": title, "nticks": 7}
     return small_multiples(panels, alt, axis, row_px=230, left_px=112)
