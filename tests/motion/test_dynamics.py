@@ -13,6 +13,7 @@ from kinertia.motion.dynamics import (
     residual_terms,
     root_derivatives,
     root_regressor,
+    segment_loads,
 )
 from kinertia.synthetic.walk import balancing_wrench
 from opensim_model import oracle_of
@@ -89,6 +90,15 @@ def test_regressor_times_parameters_is_the_residual_plus_the_ground_load(skeleto
     moved = wrench[:, 3:] - np.cross(motion.q[:, :3], wrench[:, :3])
     loads = np.hstack([wrench[:, :3], moved])
     np.testing.assert_allclose(shown - loads, residual(skeleton, bsp, motion, wrench), atol=1e-8)
+
+
+def test_loads_of_segments_are_the_regressor_times_their_parameters(skeleton, bsp, motion):
+    carried = literature_bsp(20.0, 1.6, "female", generic_model().geometry)
+    every = root_regressor(skeleton, bsp.segments, motion).reshape(len(motion.q), 6, -1, 10)
+    sums = (bsp.dynamic_parameters() + carried.dynamic_parameters()).reshape(-1, 10)
+    rows = [skeleton.segments.index(name) for name in bsp.segments]
+    found = segment_loads(skeleton.carrying(carried), bsp, motion)
+    np.testing.assert_allclose(found[rows], np.einsum("nisk,sk->sni", every, sums), rtol=1e-10, atol=1e-9)
 
 
 def test_consistent_acceleration_leaves_no_residual(skeleton, bsp, motion, wrench):

@@ -32,8 +32,6 @@ _COMPLETE = "complete"
 """File that marks a complete folder."""
 SOURCES = (
     "model/compiled.py",
-    "model/compiled.py",
-    "model/kinematic_tree.py",
     "model/kinematic_tree.py",
     "motion/rigid_body.py",
     "motion/dynamics.py",
@@ -46,10 +44,7 @@ SOURCES = (
     "estimation/simultaneous/linear_algebra/block_tridiagonal.py",
     "estimation/simultaneous/linear_algebra/normal_equations.py",
     "estimation/simultaneous/linear_algebra/elimination.py",
-    "estimation/simultaneous/terms/root_equations.py",
     "estimation/simultaneous/terms/root_terms.py",
-    "estimation/simultaneous/linear_algebra/normal_equations.py",
-    "estimation/simultaneous/markers/marker_errors.py",
     "estimation/simultaneous/markers/marker_errors.py",
     "estimation/simultaneous/terms/marker_terms.py",
 )

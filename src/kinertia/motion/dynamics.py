@@ -126,6 +126,17 @@ def root_regressor(skeleton: Skeleton, segments: Sequence[str], motion: Motion) 
     return chosen.reshape(len(chosen), 6, 10 * len(rows))
 
 
+def segment_loads(skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion) -> np.ndarray:
+    """Compute the load (s, n, 6) that each segment and what it carries require, N and N m about the root's centre."""
+    parameters = np.zeros((len(skeleton.segments), 10))
+    for own in (bsp, skeleton.carried):
+        if own is not None:
+            rows = [skeleton.segments.index(segment) for segment in own.segments]
+            np.add.at(parameters, rows, own.dynamic_parameters().reshape(-1, 10))
+    about = np.ascontiguousarray(skeleton.root.centre(motion.q))
+    return required_loads(skeleton.tree, skeleton.gravity_m_s2, parameters, *axis_motion(skeleton, motion), about)
+
+
 def root_derivatives(
     skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, wrench: np.ndarray
 ) -> RootDerivatives:
@@ -184,6 +195,46 @@ def regressor(tree: KinematicTree, gravity_m_s2: float, x: Float2, v: Float2, a:
             own_regressor(w, e, b, in_body)
             to_ground(rotation[s], translation[s], about[k], in_body, result[k, :, s])
     return result
+
+
+@compiled
+def required_loads(
+    tree: KinematicTree, gravity_m_s2: float, parameters: Float2, x: Float2, v: Float2, a: Float2, about: Float2
+) -> np.ndarray:
+    """Compute the loads (s, n, 6) of segments with parameters (s, 10): `regressor` times these, in less memory."""
+    n, count = x.shape
+    segments = len(tree.last_axis)
+    result = np.zeros((segments, n, 6))
+    frame = empty_frame(count, gravity_m_s2)
+    rotation, translation = np.empty((segments, 3, 3)), np.empty((segments, 3))
+    w, e, b, own, load = np.empty(3), np.empty(3), np.empty(3), np.empty((6, 10)), np.empty(6)
+    for k in range(n):
+        move(tree, x[k], v[k], a[k], frame)
+        place_segments(tree, frame.rotation, frame.translation, rotation, translation)
+        for s in range(segments):
+            last_axis = tree.last_axis[s]
+            if last_axis < 0:
+                continue
+            in_segment(frame.velocity[last_axis], frame.acceleration[last_axis], rotation[s], translation[s], w, e, b)
+            own_regressor(w, e, b, own)
+            for r in range(6):
+                load[r] = 0.0
+                for c in range(10):
+                    load[r] += own[r, c] * parameters[s, c]
+            _load_to_ground(rotation[s], translation[s], about[k], load, result[s, k])
+    return result
+
+
+@part
+def _load_to_ground(rotation: np.ndarray, at: np.ndarray, about: np.ndarray, own: np.ndarray, out: np.ndarray) -> None:
+    """Write a load (6,) in ground axes and about another point to `out`; the segment's origin is at `at`."""
+    x, y, z = at[0] - about[0], at[1] - about[1], at[2] - about[2]
+    for r in range(3):
+        out[r] = rotation[r, 0] * own[0] + rotation[r, 1] * own[1] + rotation[r, 2] * own[2]
+        out[3 + r] = rotation[r, 0] * own[3] + rotation[r, 1] * own[4] + rotation[r, 2] * own[5]
+    out[3] += y * out[2] - z * out[1]
+    out[4] += z * out[0] - x * out[2]
+    out[5] += x * out[1] - y * out[0]
 
 
 @part

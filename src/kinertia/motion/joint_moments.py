@@ -27,7 +27,7 @@ from scipy.spatial.transform import Rotation
 
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Axis, Joint, Pose, Skeleton
-from kinertia.motion.dynamics import Motion, root_regressor
+from kinertia.motion.dynamics import Motion, segment_loads
 from kinertia.motion.workload import pieces
 from kinertia.trial.data import FEET
 
@@ -133,6 +133,7 @@ def joint_wrenches(
     motion: Motion,
     foot_loads: np.ndarray,
     joints: Sequence[BodyJoint] | None = None,
+    pose: Pose | None = None,
 ) -> dict[BodyJoint, np.ndarray]:
     """Compute force (N) of the proximal on the distal segment and moment (N m) about joint centres (n, 6), ground axes.
 
@@ -140,23 +141,21 @@ def joint_wrenches(
         skeleton, bsp, motion: as in `residual`.
         foot_loads: (n, 2, 6) on right and left foot: force (N), moment about the ground origin (N m).
         joints: those to compute; `leg_joints` if None.
+        pose: of this motion, where it is known already.
     """
-    pose, about = skeleton.pose(motion.q), skeleton.root.centre(motion.q)
-    needed = np.zeros((len(skeleton.segments), len(motion.q), 6))
-    for part in (bsp, skeleton.carried):
-        if part is not None:
-            loads = root_regressor(skeleton, part.segments, motion).reshape(len(motion.q), 6, -1, 10)
-            wrenches = np.einsum("nisk,sk->sni", loads, part.dynamic_parameters().reshape(-1, 10))
-            np.add.at(needed, [skeleton.segments.index(name) for name in part.segments], wrenches)
+    chosen, pose = leg_joints(skeleton) if joints is None else joints, pose or skeleton.pose(motion.q)
+    if not chosen:
+        return {}
+    about = skeleton.root.centre(motion.q)
+    needed = segment_loads(skeleton, bsp, motion)
     ground = np.concatenate([foot_loads[..., :3], foot_loads[..., 3:]], axis=-1).copy()
     ground[..., 3:] -= np.cross(about[:, None], ground[..., :3])
-    result = {}
-    for joint in leg_joints(skeleton) if joints is None else joints:
-        load = needed[_beyond(skeleton, joint)].sum(axis=0)
+    loads = np.stack([needed[_beyond(skeleton, joint)].sum(axis=0) for joint in chosen])
+    for load, joint in zip(loads, chosen, strict=True):
         load -= ground[:, FEET.index(joint.side)] if joint.side else 0.0
-        load[:, 3:] -= np.cross(joint.centre(skeleton, pose) - about, load[:, :3])
-        result[joint] = load
-    return result
+    arms = np.stack([joint.centre(skeleton, pose) for joint in chosen]) - about
+    loads[..., 3:] -= np.cross(arms, loads[..., :3])
+    return dict(zip(chosen, loads, strict=True))
 
 
 def _beyond(skeleton: Skeleton, joint: BodyJoint) -> list[int]:
@@ -313,12 +312,26 @@ def joint_moments(
         skeleton, bsp, motion, foot_loads: as in `joint_wrenches`.
         frame: axes of the moments.
     """
-    joints, n = body_joints(skeleton), len(motion.q)
+    joints = body_joints(skeleton)
+    loads = joint_loads(skeleton, bsp, motion, foot_loads, joints, frame)
+    return JointMoments(tuple(joint.label for joint in joints), *loads, constraints(skeleton, joints))
+
+
+def joint_loads(
+    skeleton: Skeleton,
+    bsp: BodySegmentParameters,
+    motion: Motion,
+    foot_loads: np.ndarray,
+    joints: Sequence[BodyJoint],
+    frame: Frame = "joint",
+) -> tuple[np.ndarray, np.ndarray]:
+    """Compute moments and forces (n, j, 3) of some of `body_joints`, as in `JointMoments`."""
+    n = len(motion.q)
     moments, forces = np.empty((n, len(joints), 3)), np.empty((n, len(joints), 3))
     for some in pieces(n):
         part = motion.cut(some)
         pose = skeleton.pose(part.q)
-        wrenches = joint_wrenches(skeleton, bsp, part, foot_loads[some], joints)
+        wrenches = joint_wrenches(skeleton, bsp, part, foot_loads[some], joints, pose)
         for k, joint in enumerate(joints):
             parent, child = (
                 pose.rotation[:, skeleton.segments.index(segment)] for segment in (joint.parent, joint.child)
@@ -326,9 +339,7 @@ def joint_moments(
             axes, wrench = joint_axes(parent, child, frame, joint.long_axis), wrenches[joint]
             moments[some, k] = component_signs(joint) * np.einsum("nak,nk->na", axes, wrench[:, 3:])
             forces[some, k] = np.einsum("nka,nk->na", child, wrench[:, :3])
-    return JointMoments(
-        tuple(moved_joint.label for moved_joint in joints), moments, forces, constraints(skeleton, joints)
-    )
+    return moments, forces
 
 
 def constraints(skeleton: Skeleton, joints: Sequence[BodyJoint]) -> np.ndarray:

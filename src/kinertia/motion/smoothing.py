@@ -195,20 +195,20 @@ def smooth(
 
 
 def interpolate(time: Array, values: Array) -> SmoothedSpline:
-    """Interpolate all samples (n, c) by natural quintic splines, as OpenSim's tools do with the columns of a file."""
+    """Interpolate all samples (n, ...) by natural quintic splines, as OpenSim's tools do with the columns of a file."""
     spacing = float((time[-1] - time[0]) / (len(time) - 1))
-    nothing, everything = np.zeros(values.shape[1]), np.full(values.shape[1], np.inf)
+    shape = values.shape[1:]
     spline = _natural((time - time[0]) / spacing, values)
-    return SmoothedSpline(time, nothing, everything, np.full(values.shape[1], np.nan), spline, spacing)
+    return SmoothedSpline(time, np.zeros(shape), np.full(shape, np.inf), np.full(shape, np.nan), spline, spacing)
 
 
 def _natural(time: Array, values: Array) -> BSpline:
-    """Interpolate values (n, c) by quintic splines that continue as parabolas at either end; long records in parts."""
+    """Interpolate values (n, ...) by quintic splines that continue as parabolas at both ends; long records in parts."""
     n = len(time)
     if n <= 2 * _ROWS_AT_ONCE:
-        ends = [(3, np.zeros(values.shape[1])), (4, np.zeros(values.shape[1]))]
+        ends = [(order, np.zeros(values.shape[1:])) for order in (3, 4)]
         return make_interp_spline(time, values, k=5, bc_type=(ends, ends))
-    coefficients = np.empty((n + 4, values.shape[1]))
+    coefficients = np.empty((n + 4, *values.shape[1:]))
     for piece in pieces(n, _ROWS_AT_ONCE):
         near = slice(max(piece.start - _FORGOTTEN_SAMPLES, 0), min(piece.stop + _FORGOTTEN_SAMPLES, n))
         # the splines are two samples before those of the same index

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.errors import KinertiaError
-from kinertia.estimation.result.drawn_fit import _reactions, chosen_draws, drawn_fit, kept_draws
+from kinertia.estimation.result.drawn_fit import chosen_draws, drawn_fit, drawn_reactions, kept_draws
 from kinertia.estimation.simultaneous.instruments.instrument_errors import GAIN as GAIN_OF_PLATE
 from kinertia.estimation.simultaneous.instruments.plates import GAIN, corrected_loads
 from kinertia.estimation.simultaneous.linear_algebra.motion_basis import MotionBasis
@@ -234,7 +234,7 @@ def test_drawn_errors_of_plates_are_added_to_the_estimated_ones():
     nothing = np.zeros(0), np.zeros((1, 0, 0))
     draws = TrialDraws(*nothing, plates, gain, *shared, np.array([0.004]), np.zeros(1))
     estimate = GroundReactions(np.arange(20) / 100, corrected(gain), plate_index, np.zeros((20, 2, 6)), None)
-    drawn = _reactions(estimate, draws, 0)
+    drawn = drawn_reactions(estimate, draws, 0)
     np.testing.assert_allclose(drawn.wrench, corrected(gain + departure), rtol=1e-12)
     assert np.abs(drawn.wrench - estimate.wrench).max() > 10.0
     np.testing.assert_allclose(estimate.time - drawn.time, 0.004)

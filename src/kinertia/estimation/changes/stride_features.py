@@ -8,19 +8,21 @@ with an error that all strides of a session share: what it makes of each average
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from kinertia.estimation.result.curve_source import CurveSource, Estimated
 from kinertia.estimation.result.cycles import spread_evenly
-from kinertia.estimation.result.drawn_fit import drawn_fit, kept_draws
+from kinertia.estimation.result.drawn_curves import DrawnCurves
+from kinertia.estimation.result.drawn_fit import drawn_bodies, drawn_joints, kept_draws
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import PosteriorDraws
 from kinertia.model.skeleton import by_side
 from kinertia.motion.gait_cycle import PERCENT, Stride
 from kinertia.motion.joint_moments import component_names, joint_and_side
+from kinertia.motion.workload import pieces
 from kinertia.trial.data import FEET
 from kinertia.trial.stances import load_edges
 
@@ -37,8 +39,22 @@ _OPPOSITE = {"opposite_toe_off_s": "toe off", "opposite_strike_s": "heel strike"
 _SAME_TIME_S = 0.003
 _FEWER = 2
 """Factor by which draws of parts are fewer than of everything: they mostly divide a variance."""
+_AT_ONCE = 10
+"""Draws whose curves are computed together."""
 Key = tuple[str, str, str, str]
 """Trial, outcome, side, phase and number of the stride; of a curve, the outcome has no event."""
+
+
+class _Curves(Protocol):
+    """Curves of a trial in d draws."""
+
+    @property
+    def angle(self) -> Callable[[np.ndarray], np.ndarray]:
+        """Coordinates (n, c, d) at n times."""
+
+    @property
+    def joint_moment(self) -> Callable[[np.ndarray], np.ndarray]:
+        """Joint moments (n, j, 3, d), N m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,9 +99,10 @@ def stride_features(
         progress: is told the share done.
         centre: its first draw takes the place of the estimate, if given.
     """
-    strides = _Strides.of(trials)
-    middle = trials if centre is None else _drawn(fit, trials, centre, 0, False).trials
-    estimate = strides.curves(middle, fit.mass_kg)
+    strides, middle = _Strides.of(trials), _curves_of(trials)
+    if centre is not None:
+        middle = _drawn(fit, trials, centre, [0], False)
+    (estimate,) = strides.curves(middle, fit.mass_kg)
     shown = np.isfinite(estimate).any(axis=1)
     keys, weights, few = strides.chosen(shown)
     counts = {source: count if source == "all" else max(2, count // _FEWER) for source in sources}
@@ -94,16 +111,17 @@ def stride_features(
     done = 0
     for source, draws in sources.items():
         features, rows = [], []
-        for number in range(counts[source]):
-            drawn = strides.curves(_drawn(fit, trials, draws, number, source == "all").trials, fit.mass_kg)[shown]
-            features.append(_means(drawn, weights))
-            rows.append(drawn[few].astype(np.float32))
-            done += 1
+        for some in pieces(counts[source], _AT_ONCE):
+            numbers = list(range(counts[source]))[some]
+            for drawn in strides.curves(_drawn(fit, trials, draws, numbers, source == "all"), fit.mass_kg):
+                features.append(_means(drawn[shown], weights))
+                rows.append(drawn[shown][few].astype(np.float32))
+            done += len(numbers)
             progress(done / sum(counts.values()))
         events[source], curves[source] = np.array(features), np.array(rows)
     means = _means(estimate[shown], weights)
     moved = [strides.later(trials, side, kind) for side, kind in _CONTACTS]
-    others = [moved_strides.curves(middle, fit.mass_kg)[shown] for moved_strides in moved]
+    others = [moved_strides.curves(middle, fit.mass_kg)[0][shown] for moved_strides in moved]
     departed = [
         _means(moved_curves, moved_strides.chosen(shown)[1]) - means
         for moved_curves, moved_strides in zip(others, moved, strict=True)
@@ -124,7 +142,7 @@ def event_means(trials: Sequence[Estimated], mass_kg: float) -> dict[Key, float]
     """Return the features of all strides of these trials; moments over this mass."""
     strides = _Strides.of(trials)
     keys, weights, _ = strides.chosen(np.ones(len(strides.keys), dtype=bool))
-    means = _means(strides.curves(trials, mass_kg), weights)
+    means = _means(strides.curves(_curves_of(trials), mass_kg)[0], weights)
     named = ((trial, f"{name} {event}", side, stride) for trial, name, side, stride in keys for event in EVENTS)
     return {key: float(mean) for key, mean in zip(named, means, strict=True) if np.isfinite(mean)}
 
@@ -136,12 +154,14 @@ class _Strides:
     Attributes:
         strides: of each trial.
         keys: of all curves, trial by trial.
+        columns: of each trial's strides, of which each curve is: an angle or else a moment, and its column.
         of_curve: the stride of each.
         few: curves of the strides that `MOST_CURVES` keeps.
     """
 
     strides: Sequence[Sequence[Stride]]
     keys: Sequence[Key]
+    columns: Sequence[Sequence[Sequence[tuple[bool, int]]]]
     of_curve: Sequence[Stride]
     few: np.ndarray
 
@@ -154,30 +174,32 @@ class _Strides:
         keys: list[Key] = []
         of_curve: list[Stride] = []
         few: list[bool] = []
+        columns: list[list[list[tuple[bool, int]]]] = []
         for trial, of_trial in zip(trials, strides, strict=True):
             kept = spread_evenly(of_trial, MOST_CURVES)
+            columns.append([])
             for stride in of_trial:
-                for name, *_ in _columns(trial, stride.side):
+                columns[-1].append([])
+                for name, is_angle, column in _columns(trial, stride.side):
+                    columns[-1][-1].append((is_angle, column))
                     keys.append((trial.name, name, stride.side, f"{stride.phase} {stride.number}"))
                     of_curve.append(stride)
                     few.append(stride in kept)
-        return cls(strides, keys, of_curve, np.array(few, dtype=bool))
+        return cls(strides, keys, columns, of_curve, np.array(few, dtype=bool))
 
-    def curves(self, trials: Sequence[Estimated], mass_kg: float) -> np.ndarray:
-        """Return the curves (k, 101) of these trials, degrees and N m/kg."""
+    def curves(self, sources: Sequence[_Curves], mass_kg: float) -> np.ndarray:
+        """Return the curves (d, k, 101) of these trials in d draws, degrees and N m/kg."""
         rows: list[np.ndarray] = []
-        for trial, of_trial in zip(trials, self.strides, strict=True):
+        for source, of_trial, columns in zip(sources, self.strides, self.columns, strict=True):
             if not of_trial:
                 continue
-            source = CurveSource(trial, "estimate")
-            time = np.concatenate([stride.time for stride in of_trial])
-            angles = np.degrees(source.angle(time)).reshape(len(of_trial), len(PERCENT), -1)
-            moments = source.joint_moment(time) / mass_kg
-            moments = moments.reshape(len(of_trial), len(PERCENT), -1)
-            for k, stride in enumerate(of_trial):
-                for _, is_angle, column in _columns(trial, stride.side):
-                    rows.append((angles if is_angle else moments)[k, :, column])
-        return np.array(rows).reshape(-1, len(PERCENT))
+            time, whole = np.concatenate([stride.time for stride in of_trial]), (len(of_trial), len(PERCENT))
+            angles, moments = np.degrees(source.angle(time)), source.joint_moment(time) / mass_kg
+            count = angles.shape[2]
+            angles, moments = (each.reshape(*whole, -1, count) for each in (angles, moments))
+            for k, some in enumerate(columns):
+                rows += [(angles if is_angle else moments)[k, :, column] for is_angle, column in some]
+        return np.array(rows).reshape(len(self.keys), len(PERCENT), -1).transpose(2, 0, 1)
 
     def later(self, trials: Sequence[TrialFit], side: str, kind: str) -> "_Strides":
         """Return the strides with this kind of contact of a foot later by CONTACT_SD_S where no plate measured it."""
@@ -239,12 +261,31 @@ def _means(curves: np.ndarray, weights: np.ndarray) -> np.ndarray:
     return np.where(unknown | ~(weights.sum(axis=2) > 0.0), np.nan, means).reshape(-1)
 
 
-def _drawn(fit: Fit, trials: Sequence[TrialFit], draws: PosteriorDraws, number: int, knees: bool) -> Fit:
-    assert fit.posterior is not None  # it has draws
-    chosen_draws = replace(draws, trials=tuple(draws.trials[fit.trials.index(trial)] for trial in trials))
-    return drawn_fit(
-        replace(fit, trials=tuple(trials), posterior=replace(fit.posterior, draws=chosen_draws)), number, knees
-    )
+def _curves_of(trials: Sequence[Estimated]) -> list[_Curves]:
+    """Return the curves of trials, which are one draw of each."""
+    return [_Single(CurveSource(trial, "estimate")) for trial in trials]
+
+
+@dataclass(frozen=True, eq=False)
+class _Single:
+    """Curves of a trial as those of one draw."""
+
+    source: CurveSource
+
+    def angle(self, time: np.ndarray) -> np.ndarray:
+        return self.source.angle(time)[..., None]
+
+    def joint_moment(self, time: np.ndarray) -> np.ndarray:
+        return self.source.joint_moment(time)[..., None]
+
+
+def _drawn(
+    fit: Fit, trials: Sequence[TrialFit], draws: PosteriorDraws, numbers: Sequence[int], knees: bool
+) -> list[_Curves]:
+    joints = {draws.coordinate_values[n].tobytes(): n for n in numbers}  # in draws of parts they are all the same
+    skeletons = {values: drawn_joints(fit.skeleton, draws, n) for values, n in joints.items()}
+    models = [(skeletons[draws.coordinate_values[n].tobytes()], drawn_bodies(fit.estimate, draws, n)) for n in numbers]
+    return [DrawnCurves.of(trial, draws.trials[fit.trials.index(trial)], numbers, models, knees) for trial in trials]
 
 
 def only(draws: PosteriorDraws, body: bool) -> PosteriorDraws:

@@ -15,7 +15,7 @@ from kinertia.motion.dynamics import Motion
 from kinertia.motion.gait_cycle import Stride
 from kinertia.motion.ground_reactions import GroundReactions, measured_reactions
 from kinertia.motion.kinematics import Kinematics
-from kinertia.motion.smoothing import interpolate
+from kinertia.motion.smoothing import equal_columns, interpolate
 from kinertia.trial.sampled_data import nearest_samples, runs, within
 
 Stage = Literal["estimate", "literature"]
@@ -98,19 +98,19 @@ class CurveSource:
     # curves are made when they are first asked for: draws of a fit ask for few of them
     @cached_property
     def _angle(self) -> "Gapped":
-        return Gapped.of(self._time, self._angles, partial(_moving, derivative=0))
+        return Gapped.of(self._time, self._angles, partial(through_angles, derivative=0))
 
     @cached_property
     def _speed(self) -> "Gapped":
-        return Gapped.of(self._time, self._angles, partial(_moving, derivative=1))
+        return Gapped.of(self._time, self._angles, partial(through_angles, derivative=1))
 
     @cached_property
     def _load(self) -> "Gapped":
-        return Gapped.of(self._time, self._loads, _cubic)
+        return Gapped.of(self._time, self._loads, through_loads)
 
     @cached_property
     def _joint(self) -> "Gapped":
-        return Gapped.of(self._time, self._joints, _cubic)
+        return Gapped.of(self._time, self._joints, through_loads)
 
     @cached_property
     def _known_leg(self) -> "Gapped":
@@ -170,9 +170,7 @@ class Gapped:
         parts: list[tuple[np.ndarray, float, float, _Curve]] = []
         if not known.size:
             return cls(values.shape[1:], ())
-        masks, group = np.unique(known, axis=1, return_inverse=True)
-        for number, mask in enumerate(masks.T):
-            columns = np.flatnonzero(group.reshape(-1) == number)
+        for mask, columns in equal_columns(known):
             for first, last in runs(mask):
                 inside = slice(first, last + 1)
                 if last - first + 1 >= _FEWEST:
@@ -198,7 +196,7 @@ def tracked(kinematics: Kinematics, time: np.ndarray, derivative: int) -> np.nda
     return np.where(known, spline(np.clip(time, spline.time[0], spline.time[-1]), derivative), np.nan)
 
 
-def _moving(time: np.ndarray, q: np.ndarray, derivative: int) -> _Curve:
+def through_angles(time: np.ndarray, q: np.ndarray, derivative: int) -> _Curve:
     """Return a derivative of the spline through coordinates as OpenSim's tools make it."""
     if len(time) >= _QUINTIC:
         return partial(interpolate(time, q), derivative=derivative)
@@ -212,7 +210,7 @@ def _through(time: np.ndarray, values: np.ndarray, degree: int) -> _Curve:
     return curve
 
 
-_linear, _cubic = partial(_through, degree=1), partial(_through, degree=3)
+_linear, through_loads = partial(_through, degree=1), partial(_through, degree=3)
 
 
 def _spread(count: int, rows: np.ndarray, values: np.ndarray) -> np.ndarray:

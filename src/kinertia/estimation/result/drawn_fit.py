@@ -1,5 +1,6 @@
 """Makes a `Fit` whose motion, parameters and calibration are one draw from the posterior of another."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -64,24 +65,24 @@ def drawn_fit(fit: Fit, number: int, knees: bool = True) -> Fit:
         KinertiaError: no draws are stored.
     """
     draws = kept_draws(fit)
-    bsp = _bsp(fit.estimate, draws, number)
-    skeleton = _skeleton(fit, fit.skeleton, draws, number)
+    bsp = drawn_bodies(fit.estimate, draws, number)
+    skeleton = drawn_joints(fit.skeleton, draws, number)
+    skeleton = skeleton.with_positions(skeleton.marker_locals + draws.places[number])
     rows = zip(fit.trials, draws.trials, strict=True)
     drawn = tuple(_trial(fit, trial, trial_draws, number, (skeleton, bsp), knees) for trial, trial_draws in rows)
     return replace(fit, estimate=bsp, skeleton=skeleton, trials=drawn, posterior=None)
 
 
-def _bsp(estimate: BodySegmentParameters, draws: PosteriorDraws, number: int) -> BodySegmentParameters:
+def drawn_bodies(estimate: BodySegmentParameters, draws: PosteriorDraws, number: int) -> BodySegmentParameters:
     """Return the parameters of a draw; segments that were not estimated keep theirs."""
     table = estimate.table().copy()
     table[[estimate.segments.index(name) for name in draws.segments]] = draws.bsp[number]
     return BodySegmentParameters.from_table(estimate.segments, table)
 
 
-def _skeleton(fit: Fit, skeleton: Skeleton, draws: PosteriorDraws, number: int) -> Skeleton:
-    """Move joint centres, axes and markers to those of a draw, except markers that are fixed in the model."""
-    values = dict(zip(draws.coordinates, draws.coordinate_values[number].tolist(), strict=True))
-    return skeleton.lock(values).with_positions(skeleton.marker_locals + draws.places[number])
+def drawn_joints(skeleton: Skeleton, draws: PosteriorDraws, number: int) -> Skeleton:
+    """Return the skeleton with joint centres and axes as in a draw."""
+    return skeleton.lock(dict(zip(draws.coordinates, draws.coordinate_values[number].tolist(), strict=True)))
 
 
 def _trial(
@@ -94,23 +95,19 @@ def _trial(
 ) -> TrialFit:
     skeleton, bsp = model
     k, in_trial = trial.kinematics, trial.skeleton.marker_locals - fit.skeleton.marker_locals
-    time, trajectory = (k.time, trial.motion.q) if trial.trajectory is None else (k.trajectory_time, trial.trajectory)
-    trajectory = trajectory + BSpline(draws.knots, draws.coefficients[number].astype(float), _DEGREE)(time)
-    spline = interpolate(time, trajectory)
-    moved = Motion(*(spline(time, order) for order in range(3)))
+    _, (moved,) = drawn_motions(trial, draws, [number])
     motion = moved if trial.trajectory is None else moved.cut(k.frames - k.trajectory_frames.start)
-    reactions = _reactions(trial.reactions, draws, number)
+    reactions = drawn_reactions(trial.reactions, draws, number)
     drawn_skeleton = skeleton.with_positions(skeleton.marker_locals + in_trial)
     curves = trial.joint_curves
     if curves is not None:
-        random = np.random.default_rng([_GEOMETRY_SEED, number]) if knees else None
-        curves = curves.drawn(k, (drawn_skeleton, bsp, moved, reactions), random)
+        curves = curves.drawn(k, (drawn_skeleton, bsp, moved, reactions), drawn_knees(number) if knees else None)
     loads = inverse_dynamics(drawn_skeleton, bsp, motion, reactions.at(k.time))
     return replace(
         trial,
         skeleton=drawn_skeleton,
         motion=motion,
-        trajectory=trajectory,
+        trajectory=moved.q,
         reactions=reactions,
         joint_loads={**trial.joint_loads, "estimate": loads},
         deviations=None,
@@ -118,7 +115,25 @@ def _trial(
     )
 
 
-def _reactions(estimate: GroundReactions, draws: TrialDraws, number: int) -> GroundReactions:
+def drawn_motions(trial: TrialFit, draws: TrialDraws, numbers: Sequence[int]) -> tuple[np.ndarray, list[Motion]]:
+    """Return the times (f,) s of `TrialFit.trajectory`, and the motion there in the draws with these numbers."""
+    k = trial.kinematics
+    time, trajectory = (k.time, trial.motion.q) if trial.trajectory is None else (k.trajectory_time, trial.trajectory)
+    departures = draws.coefficients[numbers]
+    some = departures if departures.any() else departures[:1]  # that are all the same
+    moved = BSpline(draws.knots, some.transpose(1, 0, 2).astype(float), _DEGREE)(time)
+    spline = interpolate(time, trajectory[:, None] + moved)
+    orders = [np.ascontiguousarray(spline(time, order).swapaxes(0, 1)) for order in range(3)]
+    motions = [Motion(*each) for each in zip(*orders, strict=True)]
+    return time, motions if len(some) == len(numbers) else motions * len(numbers)
+
+
+def drawn_knees(number: int) -> np.random.Generator:
+    """Return the generator for the geometry of the knees in a draw: the same in all its trials."""
+    return np.random.default_rng([_GEOMETRY_SEED, number])
+
+
+def drawn_reactions(estimate: GroundReactions, draws: TrialDraws, number: int) -> GroundReactions:
     """Return the ground reactions with plate errors and delay as drawn.
 
     The estimate's errors are corrected already, so only the differences from them are applied: small ones add up.

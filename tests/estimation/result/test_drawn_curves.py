@@ -1,0 +1,30 @@
+"""Curves of several draws at once are those of one drawn fit after another."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.estimation.changes.stride_features import usual_sources
+from kinertia.estimation.result.curve_source import CurveSource
+from kinertia.estimation.result.drawn_curves import DrawnCurves
+from kinertia.estimation.result.drawn_fit import drawn_bodies, drawn_fit, drawn_joints
+
+NUMBERS = [0, 3, 4]
+
+
+@pytest.mark.parametrize("source", ["all", "body", "instruments"])
+def test_curves_of_several_draws(fit, source):
+    draws, (trial,) = usual_sources(fit)[source], fit.trials
+    models = [(drawn_joints(fit.skeleton, draws, n), drawn_bodies(fit.estimate, draws, n)) for n in NUMBERS]
+    found = DrawnCurves.of(trial, draws.trials[0], NUMBERS, models, source == "all")
+    time = np.linspace(*trial.joint_curves.time[[0, -1]], 301)
+    angles, moments = found.angle(time), found.joint_moment(time)
+    drawn = replace(fit, posterior=replace(fit.posterior, draws=draws))
+    for place, number in enumerate(NUMBERS):
+        one = CurveSource(drawn_fit(drawn, number, source == "all").trials[0], "estimate")
+        np.testing.assert_allclose(angles[..., place], one.angle(time), rtol=1e-10, atol=1e-12)
+        np.testing.assert_allclose(moments[..., place], one.joint_moment(time), rtol=1e-10, atol=1e-9)
+    assert np.isfinite(moments).any()
+    assert np.nanmax(np.ptp(moments, axis=3)) > 0.1
+    assert (np.nanmax(np.ptp(angles, axis=2)) > 1e-4) == (source == "all")
