@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -300,10 +301,11 @@ def test_marker_never_seen_has_no_distance():
 
 
 @settings(max_examples=25)
-@given(count=st.integers(1, 20), legend=st.integers(0, 6))
-def test_panels_never_overlap(count, legend):
+@given(count=st.integers(1, 20), legend=st.integers(0, 6), compact_px=st.sampled_from([0, 108]))
+def test_panels_never_overlap(count, legend, compact_px):
     traces = [{"type": "scatter", "y": [1.0], "name": f"line {k}"} for k in range(legend)]
-    figure = small_multiples([Panel(f"panel {k}", traces) for k in range(count)], "alt", {})
+    panels = [Panel(f"panel {k}", traces) for k in range(count)]
+    figure = small_multiples(panels, "alt", {"title": {"text": "time"}}, compact_px=compact_px)
     for flat in figure.layout["meta"]["arrangements"].values():
         boxes = []
         for k in range(count):
@@ -314,6 +316,19 @@ def test_panels_never_overlap(count, legend):
             assert 0 <= low < high <= 1
             for other_left, other_right, other_low, other_high in boxes[:i]:
                 assert right < other_left or other_right < left or high < other_low or other_high < low
+
+
+def test_compact_panels_share_the_labels_below_them():
+    """The lowest panel of each column has them; titles are on two lines, and whole on paper and in what is saved."""
+    titles = ["Hip power, generation + (W/kg)", "Knee flexion + (deg)", "Ankle internal rotation + (deg)"]
+    figure = small_multiples([Panel(title, []) for title in titles], "alt", {"title": {"text": "%"}}, compact_px=108)
+    ways = figure.layout["meta"]["arrangements"]
+    labelled = {name: [way[f"xaxis{k}.showticklabels"] for k in ("", 2, 3)] for name, way in ways.items()}
+    assert labelled == {"1": [False, True, True], **dict.fromkeys(("2", "3", "print"), [True] * 3)}
+    assert [note["text"] for note in figure.layout["annotations"]] == [f"<b>{title}</b>" for title in titles]
+    assert [ways["print"][f"annotations[{k}].text"] for k in range(3)] == [f"<b>{title}</b>" for title in titles]
+    lines = [re.sub("<[^>]+>", "", ways["1"][f"annotations[{k}].text"].replace("<br>", "|")) for k in range(3)]
+    assert lines == ["Hip power|generation + (W/kg)", "Knee flexion +|(deg)", "Ankle int. rotation +|(deg)"]
 
 
 def test_coordinates_without_a_partner_keep_their_names():

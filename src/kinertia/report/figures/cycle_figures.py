@@ -45,6 +45,8 @@ _OF_FILES: Mapping[Kind, SignConvention] = {"joint_moment": "isb", "clinical": "
 """Signs of the curves in `cycles.csv`."""
 _SD_OPACITY, _BAND_OPACITY, _STRIDE_OPACITY, _GAP_OPACITY = 0.13, 0.25, 0.45, 0.08
 _OF_LANDINGS: tuple[Kind, ...] = ("joint_moment", "moment", "angle", "power", "force")
+_FLEXION_POWERS = frozenset({"hip_flexion_power", "knee_angle_power", "ankle_angle_power"})
+_PANEL_PX = 108
 _PERCENT_OF: Mapping[Phase, str] = {"stride": "the gait cycle", "stance": "stance", "landing": "the landing"}
 _FORCE_TITLES = dict(zip(FORCES, ("Forward +", "Upward +", "Towards the other foot +"), strict=True))
 
@@ -67,19 +69,31 @@ def cycle_figures(
         fit: the fit.
         norms: grey bands below.
         curves: `drawn_curves` of the fit, where they are known.
-        legs: leave out the trunk in figures of joint moments and of an OpenSim model's angles.
+        legs: leave out the trunk in figures of joint moments and of an OpenSim model's angles, and powers that are in
+            `other_powers`.
     """
+    drawn = _of_main_task(fit, norms, curves, legs)
+    figures = {} if drawn is None else {kind: drawn.figure(kind) for kind in UNITS}
+    return {kind: figure for kind, figure in figures.items() if figure is not None}
+
+
+def other_powers(fit: Fit, curves: CurvesByStage | None = None) -> Figure | None:
+    """Draw powers about axes other than flexion and extension; None without any."""
+    drawn = _of_main_task(fit, {}, curves, legs=True)
+    return None if drawn is None else replace(drawn, without_flexion=True).figure("power")
+
+
+def _of_main_task(fit: Fit, norms: Norms, curves: CurvesByStage | None, legs: bool) -> "_Drawn | None":
+    """Collect what the figures over the gait cycle show; None without strides."""
     fit = main_task(fit)
     if not any(trial.strides for trial in fit.trials):
-        return {}
+        return None
     names = {trial.name for trial in fit.trials}
     known = curves or drawn_curves(fit)
     estimate, literature = (
         _by_quantity(curve for curve in known[stage] if curve.trial in names) for stage in ("estimate", "literature")
     )
-    drawn = _Drawn(fit, estimate, literature, norms, legs=legs)
-    figures = {kind: drawn.figure(kind) for kind in UNITS}
-    return {kind: figure for kind, figure in figures.items() if figure is not None}
+    return _Drawn(fit, estimate, literature, norms, legs=legs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,6 +187,7 @@ class _Drawn:
     norms: Norms
     phase: Phase = "stride"
     legs: bool = False
+    without_flexion: bool = False
 
     def figure(self, kind: Kind) -> Figure | None:
         panels = [
@@ -189,14 +204,17 @@ class _Drawn:
             return None
         axis: dict[str, Any] = {"range": [0, 100], "tickvals": [0, 20, 40, 60, 80, 100]}
         axis["title"] = {"text": f"% of {_PERCENT_OF[self.phase]}", "font": {"size": 11}, "standoff": 2}
-        return small_multiples(panels, self._alt(kind), axis)
+        return small_multiples(panels, self._alt(kind), axis, compact_px=_PANEL_PX)
 
     def _wanted(self, quantity: str, kind: Kind) -> bool:
         """Return whether a panel is drawn: with `legs` no moments of the trunk, nor angles of it if a model's own are
-        shown.
+        shown; of powers over strides those of flexion, or the others.
         """
-        if not self.legs or kind not in ("joint_moment", "angle"):
+        if not self.legs or kind not in ("joint_moment", "angle", "power"):
             return True
+        if kind == "power":
+            known = {name for name, _ in self.estimate} & _FLEXION_POWERS if self.phase == "stride" else set()
+            return (quantity not in known) == self.without_flexion if known else not self.without_flexion
         if kind == "joint_moment":
             return not quantity.startswith(_TRUNK)
         skeleton = self.fit.skeleton

@@ -14,6 +14,7 @@ import gzip
 import html
 import json
 import math
+import re
 import textwrap
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -51,6 +52,9 @@ _TITLE_PX, _TICKS_PX, _NOMINAL_WIDTH_PX = 30, 40, 960
 MOST_COLUMNS = 3
 _PAPER_PX = 620
 """Rows of panels on a sheet of paper, below the table of strides, at the scale of the page's print style."""
+_COMPACT_COLUMNS, _COMPACT_WIDTH_PX = {"1": 2, "2": 3, "3": 3, "print": 3}, {"1": 366, "2": 650}
+"""Columns of compact panels, and the width of a figure for which they are meant, by the arrangement's name."""
+_ROTATION = re.compile(r"\b(int|ext)ernal rotation\b")
 _AXIS = {
     "zeroline": True,
     "zerolinecolor": PALE,
@@ -112,7 +116,9 @@ class Figure:
 
 def written(figure: Figure) -> dict[str, Any]:
     """Return a figure for the templates: its text alternative, and the compressed input of plotly.js."""
-    return {"alt": figure.alt, "packed": packed(figure.to_json().encode()), "height": figure.layout["height"]}
+    ways = figure.layout["meta"].get("arrangements", {})
+    height = ways.get(str(MOST_COLUMNS), figure.layout)["height"]
+    return {"alt": figure.alt, "packed": packed(figure.to_json().encode()), "height": height}
 
 
 def compact(values: np.ndarray) -> np.ndarray:
@@ -185,8 +191,25 @@ def shaded(first: float, last: float, colour: str) -> dict[str, Any]:
     return {"type": "rect", **place, "fillcolor": colour, "line": {"width": 0}, "layer": "below"}
 
 
+@dataclass(frozen=True)
+class _Room:
+    """Sizes of panels, px: height, space on the left, above and below each, and width of the whole figure."""
+
+    row_px: int
+    left_px: int = 52
+    title_px: int = _TITLE_PX
+    ticks_px: int = _TICKS_PX
+    width_px: int = _NOMINAL_WIDTH_PX
+
+
 def small_multiples(
-    panels: Sequence[Panel], alt: str, x: dict[str, Any], row_px: int = 170, left_px: int = 52, linked: bool = True
+    panels: Sequence[Panel],
+    alt: str,
+    x: dict[str, Any],
+    row_px: int = 170,
+    left_px: int = 52,
+    linked: bool = True,
+    compact_px: int = 0,
 ) -> Figure:
     """Arrange panels of one kind as one figure.
 
@@ -197,6 +220,8 @@ def small_multiples(
         row_px: height of a panel.
         left_px: room for the labels of a vertical axis.
         linked: whether all panels have the same horizontal range.
+        compact_px: height of a panel on pages, where panels share labels and two are side by side on a phone; 0 for
+            pages like other output.
     """
     data, shapes, titles = [], [], []
     axes: dict[str, Any] = {}
@@ -215,17 +240,50 @@ def small_multiples(
             refs = {ref: f"{ref[0]}{suffix}{' domain' if shape.get(ref) else ''}" for ref in ("xref", "yref")}
             shapes.append({**shape, **refs})
         place = {"xref": f"x{suffix} domain", "yref": f"y{suffix} domain", "x": 0, "y": 1}
-        anchors = {"xanchor": "left", "yanchor": "bottom", "showarrow": False, "font": {"size": 12}}
+        anchors = {"xanchor": "left", "yanchor": "bottom", "showarrow": False, "align": "left", "font": {"size": 12}}
         titles.append({"text": f"<b>{plain(panel.title)}</b>", **place, **anchors})
     ways: dict[str, Any] = {
-        str(c): _arrangement(len(panels), c, row_px, left_px, len(shown)) for c in range(1, MOST_COLUMNS + 1)
+        str(c): _arrangement(len(panels), c, _Room(row_px, left_px), len(shown)) for c in range(1, MOST_COLUMNS + 1)
     }
-    rows = math.ceil(len(panels) / MOST_COLUMNS)
-    on_paper_px = min(row_px, _PAPER_PX // rows - _TITLE_PX - _TICKS_PX)
-    ways["print"] = _arrangement(len(panels), MOST_COLUMNS, max(on_paper_px, 80), left_px, len(shown))
     layout = {**base_layout(alt), **axes, "shapes": shapes, "annotations": titles}
-    layout["meta"] = {**layout["meta"], "arrangements": ways}
-    return Figure(data, _arranged(layout, ways[str(MOST_COLUMNS)]))
+    arranged = _arranged(layout, ways[str(MOST_COLUMNS)])
+    if compact_px:
+        ways = _compact(panels, x, compact_px, len(shown))
+    else:
+        rows = math.ceil(len(panels) / MOST_COLUMNS)
+        on_paper_px = min(row_px, _PAPER_PX // rows - _TITLE_PX - _TICKS_PX)
+        ways["print"] = _arrangement(len(panels), MOST_COLUMNS, _Room(max(on_paper_px, 80), left_px), len(shown))
+    return Figure(data, {**arranged, "meta": {**layout["meta"], "arrangements": ways}})
+
+
+def _compact(panels: Sequence[Panel], x: dict[str, Any], row_px: int, legend: int) -> dict[str, Any]:
+    """Return arrangements of small panels, which share the labels of their horizontal axes.
+
+    On a screen what follows the first comma or stands in brackets is on a second line of a title.
+    """
+    ways, count = {}, len(panels)
+    for name, columns in _COMPACT_COLUMNS.items():
+        paper = name == "print"
+        title_px, width_px = (22, _NOMINAL_WIDTH_PX) if paper else (38, _COMPACT_WIDTH_PX.get(name, _NOMINAL_WIDTH_PX))
+        way = _arrangement(count, columns, _Room(row_px, 38, title_px, 10, width_px), legend)
+        for k, panel in enumerate(panels):
+            suffix = "" if k == 0 else str(k + 1)
+            lowest = k + min(columns, count) >= count
+            way[f"xaxis{suffix}.showticklabels"] = lowest
+            way[f"xaxis{suffix}.title.text"] = x["title"]["text"] if lowest else ""
+            title = panel.title if columns > 2 else _ROTATION.sub(r"\1. rotation", panel.title)
+            way[f"annotations[{k}].text"] = f"<b>{plain(title)}</b>" if paper else _on_two_lines(title)
+        ways[name] = way
+    return ways
+
+
+def _on_two_lines(title: str) -> str:
+    """Break a title before its direction or its unit: "Hip power", "generation + (W/kg)"."""
+    comma, bracket = title.find(", "), title.find(" (")
+    at = comma if 0 <= comma < bracket else bracket
+    if at < 0:
+        return f"<b>{plain(title)}</b>"
+    return f'<b>{plain(title[:at])}</b><br><span style="font-size:11px">{plain(title[at:].lstrip(", "))}</span>'
 
 
 def _arranged(layout: dict[str, Any], flat: dict[str, Any]) -> dict[str, Any]:
@@ -260,7 +318,7 @@ def sentence_figure(text: str) -> Figure:
     return Figure([], layout)
 
 
-def _arrangement(count: int, columns: int, row_px: int, left_px: int, legend: int) -> dict[str, Any]:
+def _arrangement(count: int, columns: int, room: _Room, legend: int) -> dict[str, Any]:
     """Return domains of all axes, top margin and height of the figure, for this many columns and legend entries.
 
     Fewer panels than columns fill the width.
@@ -268,17 +326,18 @@ def _arrangement(count: int, columns: int, row_px: int, left_px: int, legend: in
     legend_rows = math.ceil(legend / _LEGEND_PER_ROW[columns])
     columns = min(columns, count)
     rows = math.ceil(count / columns)
-    inner_px = rows * row_px + (rows - 1) * (_TITLE_PX + _TICKS_PX)
-    gap = (left_px + 6) / (_NOMINAL_WIDTH_PX - left_px - _RIGHT_PX)
+    each_px = room.row_px + room.title_px + room.ticks_px
+    inner_px = rows * each_px - room.title_px - room.ticks_px
+    gap = (room.left_px + 6) / (room.width_px - room.left_px - _RIGHT_PX)
     width = (1 - (columns - 1) * gap) / columns
-    top_px = _TITLE_PX + _LEGEND_ROW_PX * legend_rows
-    layout: dict[str, Any] = {"height": inner_px + top_px + _BOTTOM_PX, "margin.t": top_px, "margin.l": left_px}
+    top_px = room.title_px + _LEGEND_ROW_PX * legend_rows
+    layout: dict[str, Any] = {"height": inner_px + top_px + _BOTTOM_PX, "margin.t": top_px, "margin.l": room.left_px}
     for k in range(count):
         row, column = divmod(k, columns)
         suffix = "" if k == 0 else str(k + 1)
-        left, top = column * (width + gap), 1 - row * (row_px + _TITLE_PX + _TICKS_PX) / inner_px
+        left, top = column * (width + gap), 1 - row * each_px / inner_px
         layout[f"xaxis{suffix}.domain"] = [round(left, 5), round(min(left + width, 1.0), 5)]
-        layout[f"yaxis{suffix}.domain"] = [round(max(top - row_px / inner_px, 0.0), 5), round(top, 5)]
+        layout[f"yaxis{suffix}.domain"] = [round(max(top - room.row_px / inner_px, 0.0), 5), round(top, 5)]
     return layout
 
 

@@ -41,6 +41,7 @@ from kinertia.report.figures.cycle_figures import (
     cycle_figures,
     drawn_curves,
     has_spread,
+    other_powers,
     phase_figures,
 )
 from kinertia.report.figures.figure import SIDE_COLOURS, SIDES, Figure, base_layout, written
@@ -194,9 +195,12 @@ def _cycle(fit: Fit, norms: Norms, curves: CurvesByStage | None) -> dict[str, An
         "profile": profile,
         "map": None if profile is None else written(map_figure(profile)),
         "clinical": None if convention_of(fit) == "opensim" else _written(clinical),
-        "spread": has_spread(figures["moment"]),
+        "spread": has_spread(clinical or figures["angle"]),
+        "longest": not has_spread(figures["moment"]),
+        "without_strides": [SIDES[side][0] for side in FEET if all(stride.side != side for stride in strides)],
         "strides": len(strides),
         "on_plates": sum(stride.on_plates for stride in strides),
+        "other_powers": _written(other_powers(fit, curves)),
         **{kind: written(figure) for kind, figure in figures.items()},
     }
 

@@ -6,7 +6,7 @@
   let printing = false;
   const columns = (px) => (px < 560 ? 1 : px < 860 ? 2 : 3);
 
-  // relayout's flat form: {"xaxis2.domain": [0, 1], height: 300, ...}
+  // relayout's flat form: {"xaxis2.domain": [0, 1], "annotations[0].text": "a", height: 300, ...}
   function arrangement(layout, width) {
     const ways = layout.meta && layout.meta.arrangements;
     return { width, ...(ways ? ways[printing && width === WHOLE_PX ? "print" : columns(width)] : {}) };
@@ -15,7 +15,7 @@
   function applied(layout, flat) {
     const whole = structuredClone(layout);
     for (const [path, value] of Object.entries(flat)) {
-      const keys = path.split(".");
+      const keys = path.split(/[.[\]]+/);
       const last = keys.pop();
       keys.reduce((inner, key) => (inner[key] ??= {}), whole)[last] = value;
     }
