@@ -203,15 +203,15 @@ def _norms_for(fit: Fit, curves: CurvesByStage, path: Path) -> tuple[dict[str, N
     """Read the norms in a file, and list those for which this fit has no curve."""
     norms, known = read_norms(path), {curve.quantity for curve in curves["estimate"]}
     check_convention(fit, norms)
-    other = sorted(set(norms) - known)
-    if len(other) == len(norms):
+    unknown = sorted(set(norms) - known)
+    if len(unknown) == len(norms):
         expected = f"use names from cycles.csv, such as {min(known)}" if known else "there are no strides"
         raise FileError(
-            path, f"no quantity of it is among the curves of this fit (the first is {other[0]}); {expected}"
+            path, f"no quantity of it is among the curves of this fit (the first is {unknown[0]}); {expected}"
         )
-    if other:
-        out.print(f"note: norms that this fit has no curve for: {', '.join(other)}")
-    return {name: norm for name, norm in norms.items() if name in known}, other
+    if unknown:
+        out.print(f"note: norms that this fit has no curve for: {', '.join(unknown)}")
+    return {name: norm for name, norm in norms.items() if name in known}, unknown
 
 
 def _conventions(typed: str) -> list[str]:

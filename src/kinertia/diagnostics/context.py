@@ -303,8 +303,8 @@ class RecordingContext(MarkerContext):
     def whole_plate_masses(self) -> Mapping[str, float]:
         """`plate_masses` of plates that bear all of the person and no one else."""
         names = () if self.plates is None else self.plates.names
-        other = self.plates_reached_beyond | {names[foreign.plate] for foreign in self.foreign_contacts}
-        return {name: kg for name, kg in self.plate_masses.items() if name not in other}
+        doubtful = self.plates_reached_beyond | {names[foreign.plate] for foreign in self.foreign_contacts}
+        return {name: kg for name, kg in self.plate_masses.items() if name not in doubtful}
 
 
 @dataclass(frozen=True, eq=False)

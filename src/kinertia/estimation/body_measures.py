@@ -160,12 +160,12 @@ def _implausible(
         if abs(away[k]) > FAR_SD
     ]
     for girth, width in girths_with_widths():
-        girth_name, other = (measures()[place].name for place in (girth, width))
-        if girth_name in stated and other in stated:
-            ratio = stated[girth_name][0] / stated[other][0]
+        girth_name, width_name = (measures()[place].name for place in (girth, width))
+        if girth_name in stated and width_name in stated:
+            ratio = stated[girth_name][0] / stated[width_name][0]
             low, high = GIRTH_OVER_WIDTH
             if not low < ratio < high:
-                measure = f"{girth_name}, as a multiple of {other},"
+                measure = f"{girth_name}, as a multiple of {width_name},"
                 found.append(_unlike(measure, Quantity(ratio, "1"), Quantity("2 to 3.14"), ratio=Quantity(ratio, "1")))
     return tuple(found)
 
@@ -191,8 +191,8 @@ def _with_errors(logs: np.ndarray, covariance: np.ndarray, lumbar_m: float, foun
     ]
     columns.append(_LUMBAR_CUT_SD_M * (_predicted(middle, lumbar_m + _STEP) - values) / _STEP)
     columns += _of_shapes_and_cuts(values)
-    other = np.array([column.ravel() for column in columns]).T
-    errors += other @ other.T
+    shape_errors = np.array([column.ravel() for column in columns]).T
+    errors += shape_errors @ shape_errors.T
     mass = slice(0, None, len(_TELLS))
     total_sd = float(np.sqrt(_HOW_MANY @ errors[mass, mass] @ _HOW_MANY))
     return MeasuredBody(values, errors, float(values[:, 0] @ _HOW_MANY), total_sd, found)

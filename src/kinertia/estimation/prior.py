@@ -238,8 +238,10 @@ def with_symmetry(covariance: np.ndarray, segments: tuple[str, ...], correlation
             j = segments.index(f"{segment[:-2]}_l")
             right, left = slice(10 * i, 10 * i + 10), slice(10 * j, 10 * j + 10)
             mirror = np.diag(MIRROR_SIGNS)
-            right_root, other = np.linalg.cholesky([covariance[right, right], mirror @ covariance[left, left] @ mirror])
-            result[right, left] = correlation * right_root @ other.T @ mirror
+            right_root, left_root = np.linalg.cholesky(
+                [covariance[right, right], mirror @ covariance[left, left] @ mirror]
+            )
+            result[right, left] = correlation * right_root @ left_root.T @ mirror
             result[left, right] = result[right, left].T
     return result
 

@@ -159,9 +159,9 @@ def _label_sides(
     """Return the side stated by each label, and whether most labels contradict their positions."""
     across = {label: place[2] for label, place in zip(labels, places, strict=True)}
     apart = [
-        across[label] - across[two]
-        for label, (side, two) in pairs.items()
-        if side == "r" and {label, two} <= set(across)
+        across[label] - across[left_label]
+        for label, (side, left_label) in pairs.items()
+        if side == "r" and {label, left_label} <= set(across)
     ]
     mirrored = sum(np.sign(apart_m) for apart_m in apart if abs(apart_m) > _APART_M) < 0
     return tuple(pairs[label][0] if label in pairs else "" for label in labels), bool(mirrored)

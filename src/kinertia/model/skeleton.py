@@ -186,9 +186,9 @@ class Skeleton:
 
     def with_markers(self, markers: Sequence[Marker]) -> Self:
         """Return the skeleton with other markers."""
-        other = replace(self, markers=tuple(markers))
-        other.__dict__.update(tree=self.tree, map=self.map)  # markers move nothing
-        return other
+        changed = replace(self, markers=tuple(markers))
+        changed.__dict__.update(tree=self.tree, map=self.map)  # markers move nothing
+        return changed
 
     def with_positions(self, positions: np.ndarray) -> Self:
         """Return the skeleton with its markers at these positions (m, 3) in their segments."""

@@ -210,8 +210,8 @@ class Measure:
     @property
     def keys(self) -> tuple[str, ...]:
         """Names of the measurement in the package, for limbs on both sides."""
-        other = {"a": "b", "j": "k"}.get(self.key[1])
-        return (self.key,) if other is None else (self.key, f"L{other}{self.key[2:]}")
+        mirrored = {"a": "b", "j": "k"}.get(self.key[1])
+        return (self.key,) if mirrored is None else (self.key, f"L{mirrored}{self.key[2:]}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -179,17 +179,17 @@ def strides_of(skeleton: Skeleton, kinematics: Kinematics) -> tuple[Stride, ...]
     strikes = {side: [e for e in events if e.event.side == side and e.event.kind == "heel strike"] for side in FEET}
     offs = {side: [e.event.time_s for e in events if e.event[1:] == (side, "toe off")] for side in FEET}
     strides = []
-    for side, other in zip(FEET, reversed(FEET), strict=True):
+    for side, opposite in zip(FEET, reversed(FEET), strict=True):
         number = 0
         for first, second in zip(strikes[side], strikes[side][1:], strict=False):
             start, end = first.event.time_s, second.event.time_s
-            across = _between([e.event.time_s for e in strikes[other]], start, end)
+            across = _between([e.event.time_s for e in strikes[opposite]], start, end)
             usual = _STRIDE_S[0] <= round(end - start, 6) <= _STRIDE_S[1] and len(across) == 1
             if not usual or not _PHASE[0] <= (across[0] - start) / (end - start) <= _PHASE[1]:
                 continue
             number += 1
             off = _only(_between(offs[side], start, end))
-            other_off = _only(_between(offs[other], start, across[0]))
+            other_off = _only(_between(offs[opposite], start, across[0]))
             on_plates = first.source == second.source == "force plate"
             strides.append(Stride(side, number, start, end, off, other_off, across[0], on_plates))
     return tuple(strides)
@@ -332,11 +332,11 @@ def _other_foot(
         return np.nan, np.nan
     lifts = float(time[swing[0]]) if swing[0] > 0 else np.nan
     lands = float(time[swing[-1] + 1]) if swing[-1] + 1 < len(time) else np.nan
-    other = FEET[1 - FEET.index(side)]
+    opposite = FEET[1 - FEET.index(side)]
     inside = [event for event in events if start_s < event.time_s < end_s]
     off, strike = (
         nearest_event(inside, frame, _SAME_EVENT_S) or frame
-        for frame in (GaitEvent(lifts, other, "toe off"), GaitEvent(lands, other, "heel strike"))
+        for frame in (GaitEvent(lifts, opposite, "toe off"), GaitEvent(lands, opposite, "heel strike"))
     )
     return off.time_s, strike.time_s
 

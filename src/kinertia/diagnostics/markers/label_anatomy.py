@@ -184,13 +184,17 @@ def _swapped_labels(body: _Body, right: FloatArray) -> Iterator[Finding]:
     landmarks = {label for labels in body.marker_set.landmarks.values() for label in labels}
     for segment in ("torso", "pelvis"):
         for label in body.marker_set.segments.get(segment, ()):
-            other = f"{'L' if label[:1].isupper() else 'l'}{label[1:]}"
-            if label[:1].upper() != "R" or {label, other} & landmarks or not {label, other} <= set(markers.labels):
+            left_label = f"{'L' if label[:1].isupper() else 'l'}{label[1:]}"
+            if (
+                label[:1].upper() != "R"
+                or {label, left_label} & landmarks
+                or not {label, left_label} <= set(markers.labels)
+            ):
                 continue
-            pair = markers.arranged([label, other])
+            pair = markers.arranged([label, left_label])
             along = cosine(pair[:, 0] - pair[:, 1], right)
             if along < -CLEAR:
-                where = body.context.at(markers=(label, other))
+                where = body.context.at(markers=(label, left_label))
                 found = finding("L202", where, cosine=Quantity(along, "1", limit=-CLEAR))
                 yield replace(found, severity=Severity.WARNING)
 

@@ -181,7 +181,9 @@ def _neighbours_change_m(markers: Markers, marker_set: MarkerSet, upper: str, lo
     """Return the median change (m) of the distances between markers of two segments; NaN where one has none."""
     here = set(markers.labels)
     above, below = ([label for label in marker_set.segments.get(name, ()) if label in here] for name in (upper, lower))
-    changes = _changes_m(markers, [(above_label, other) for above_label in above for other in below], np.nan)
+    changes = _changes_m(
+        markers, [(above_label, below_label) for above_label in above for below_label in below], np.nan
+    )
     return float(np.nanmedian(changes)) if np.isfinite(changes).any() else np.nan
 
 
@@ -193,9 +195,9 @@ def _pairs(markers: Markers, marker_set: MarkerSet, noise_m: float) -> list[_Pai
         if not name.startswith(_SOFT):
             present = [label for label in labels if label in here]
             named += [(first, other, name, within) for first, other in combinations(present, 2)]
-    for upper, other in _JOINED:
+    for upper, lower in _JOINED:
         for side in "rl":
-            both = [marker_set.landmarks.get(f"{name}_{side}", ()) for name in (upper, other)]
+            both = [marker_set.landmarks.get(f"{name}_{side}", ()) for name in (upper, lower)]
             if all(labels and labels[0] in here for labels in both):
                 named.append((both[0][0], both[1][0], f"{upper.partition('_')[0]}_{side}", across))
     changes = _changes_m(markers, [(first, other) for first, other, *_ in named])

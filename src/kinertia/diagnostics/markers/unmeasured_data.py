@@ -239,9 +239,9 @@ def _in_pelvis(place: Mapping[str, FloatArray], marker_set: MarkerSet) -> dict[s
 
 def _frames(points: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return origins (n, t, 3) and axes (n, t, 3, 3) through all triples of points (n, p, 3) that are not in line."""
-    first, two, three = np.array(list(permutations(range(points.shape[1]), 3))).T
+    first, second, three = np.array(list(permutations(range(points.shape[1]), 3))).T
     origin = points[:, first]
-    x, across = points[:, two] - origin, points[:, three] - origin
+    x, across = points[:, second] - origin, points[:, three] - origin
     lengths = np.linalg.norm(x, axis=2) * np.linalg.norm(across, axis=2)
     normal = np.cross(x, across)
     sine = np.linalg.norm(normal, axis=2) / np.maximum(lengths, 1e-12)

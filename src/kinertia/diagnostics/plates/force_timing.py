@@ -351,12 +351,12 @@ def belt_speed(context: RecordingContext) -> Iterator[Finding]:
         causes = ("right and left belt interchanged",)
     elif abs(stated[worst] / max(speeds[worst], 1e-9) / _KM_H - 1) < _APART:
         causes = ("a speed in km/h",)
-    two = belt.speed_m_s.ndim == 2
+    split_belt = belt.speed_m_s.ndim == 2
     evidence = {
         "stated_m_s": Quantity(stated[worst], "m/s"),
         "feet_m_s": Quantity(speeds[worst], "m/s"),
-        "foot": Quantity(FOOT_NAMES[worst] if two else "either"),
+        "foot": Quantity(FOOT_NAMES[worst] if split_belt else "either"),
     }
-    if not two:
+    if not split_belt:
         evidence["belt_speed_m_s"] = Quantity(speeds[worst], "m/s")
     yield with_evidence("T301", context.at(), evidence, causes=causes)

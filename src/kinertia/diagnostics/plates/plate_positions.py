@@ -258,11 +258,11 @@ def _at_the_same_place(plates: PlateLoads, p: int, parts: tuple[int, ...]) -> bo
     if len(parts) != 1 or plates.corners is None:
         return False
     (other,) = parts
-    first, two = (plates.force[:, plate, 1] for plate in (p, other))
-    loaded = (first > _LOADED_N) | (two > _LOADED_N)
+    first, second = (plates.force[:, plate, 1] for plate in (p, other))
+    loaded = (first > _LOADED_N) | (second > _LOADED_N)
     middles: FloatArray = plates.corners[[p, other]].mean(axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
-        alike = np.corrcoef(first[loaded], two[loaded])[0, 1] > _PROPORTIONAL
+        alike = np.corrcoef(first[loaded], second[loaded])[0, 1] > _PROPORTIONAL
     return bool(alike and np.linalg.norm(middles[0] - middles[1]) < _SAME_PLACE_M)
 
 

@@ -85,7 +85,7 @@ def stature(context: RecordingContext) -> Iterator[Finding]:
         return
     marks = find_landmarks(context.recording, context.marker_set)
     lengths = [
-        sum(float(np.linalg.norm(marks[f"{upper}_{side}"] - marks[f"{other}_{side}"])) for upper, other in _PARTS)
+        sum(float(np.linalg.norm(marks[f"{upper}_{side}"] - marks[f"{lower}_{side}"])) for upper, lower in _PARTS)
         for side in "rl"
         if all(f"{name}_{side}" in marks for pair in _PARTS for name in pair)
     ]

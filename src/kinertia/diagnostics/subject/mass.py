@@ -209,8 +209,10 @@ def _level_kg(context: PersonContext, plates: PlateLoads, loaded: Sequence[str])
         levels = [
             there.level_n[1]
             for trial in context.trials
-            if (other := trial.plates) is not None and other.unloaded is not None and other.corners is not None
-            for same, there, place in zip(other.names, other.unloaded, other.corners, strict=True)
+            if (trial_plates := trial.plates) is not None
+            and trial_plates.unloaded is not None
+            and trial_plates.corners is not None
+            for same, there, place in zip(trial_plates.names, trial_plates.unloaded, trial_plates.corners, strict=True)
             if same == name and there.subtracted and np.allclose(place, corners, atol=_SAME_PLACE_M)
         ]
         if name in loaded and np.isnan(unloaded.level_n[1]) and levels:
@@ -225,8 +227,10 @@ def _together(occasions: Sequence[_Occasion]) -> list[_Occasion]:
     weights = np.array([occasion.sd_kg**-2 for occasion in occasions])
     mass_kg = float(weights @ [occasion.mass_kg for occasion in occasions] / weights.sum())
     sd_kg = float(weights.sum() ** -0.5)
-    for first, two in combinations(occasions, 2):
-        if abs(first.mass_kg - two.mass_kg) > WARNING_SHARE * mass_kg + 2.0 * float(np.hypot(first.sd_kg, two.sd_kg)):
+    for first, second in combinations(occasions, 2):
+        if abs(first.mass_kg - second.mass_kg) > WARNING_SHARE * mass_kg + 2.0 * float(
+            np.hypot(first.sd_kg, second.sd_kg)
+        ):
             return list(occasions)
     over = " and ".join(dict.fromkeys(occasion.over for occasion in occasions))
     return [_Occasion(None, mass_kg, sd_kg, over, count=len({occasion.trial for occasion in occasions}))]
@@ -287,24 +291,28 @@ def _causes(
 ) -> tuple[tuple[str, ...], str]:
     """Return the causes, likeliest first, and the remedy for the first."""
     heavier = occasion.mass_kg > stated_kg
-    other = _LOAD if heavier else _SUPPORT
+    second_cause = _LOAD if heavier else _SUPPORT
     if _near(occasion.mass_kg / stated_kg, 1.0 / _POUND):
         return (_STATED_OVER_POUND, _STATED), "Give the mass in kg"
     light, *_, heavy = sorted(by_plate, key=by_plate.__getitem__) if len(by_plate) > 1 else ("", "")
     if light and by_plate[heavy] > (1.0 + _SAME) * by_plate[light]:
         plate, right = (heavy, light) if heavier else (light, heavy)
         if abs(by_plate[right] / stated_kg - 1.0) <= _SAME:
-            return (f"gain or zero of {plate}", other, _STATED), f"Check {plate} with a known weight"
+            return (f"gain or zero of {plate}", second_cause, _STATED), f"Check {plate} with a known weight"
     nearer = [abs(witness.mass_kg - occasion.mass_kg) < abs(witness.mass_kg - stated_kg) for witness in witnesses]
     if nearer and 2 * sum(nearer) < len(nearer):
         action = "Check the plates with a known weight, unless something was carried"
-        return (_PLATES, other), action if heavier else "Check the plates with a known weight"
+        return (_PLATES, second_cause), action if heavier else "Check the plates with a known weight"
     if not nearer and len(by_plate) < 2:
         if heavier and occasion.mass_kg - stated_kg > _LOAD_KG:
-            return (other, _STATED, _PLATES), "Declare what was worn or carried as [[attached]], or correct the mass"
-        return (_STATED, _PLATES, other), "Check the mass, and gain and zero of the plates"
+            return (
+                second_cause,
+                _STATED,
+                _PLATES,
+            ), "Declare what was worn or carried as [[attached]], or correct the mass"
+        return (_STATED, _PLATES, second_cause), "Check the mass, and gain and zero of the plates"
     carried = ", or declare what was worn or carried as [[attached]]" if heavier else ""
-    return (_STATED, other, _PLATES), f"Correct the mass{carried}"
+    return (_STATED, second_cause, _PLATES), f"Correct the mass{carried}"
 
 
 def _near(ratio: float, wanted: float) -> bool:

@@ -278,8 +278,8 @@ def _witnesses(
     """Compute distances (m, or log of a ratio) of further recordings, from the moved markers, else from all."""
     about = {label for marker in moved for label in marker.labels}
 
-    def apart(recording: RecordingContext, two: RecordingContext) -> float:
-        distances = SegmentDistances.of(recording.all_markers, two.all_markers, marker_set)
+    def apart(recording: RecordingContext, reference: RecordingContext) -> float:
+        distances = SegmentDistances.of(recording.all_markers, reference.all_markers, marker_set)
         if not moved:
             return abs(float(np.log(distances.ratio()))) if len(distances.pairs) else np.nan
         involved = np.isin(distances.pairs, [k for k, label in enumerate(distances.labels) if label in about]).any(
@@ -312,18 +312,18 @@ def repeated_trials(context: PersonContext) -> Iterator[Finding]:
     for first, other in combinations(context.trials, 2):
         if not _overlap(first.window_s, other.window_s):
             continue
-        recording, two = first.recording, other.recording
-        if _same(recording.markers.positions, two.markers.positions):
+        recording, other_recording = first.recording, other.recording
+        if _same(recording.markers.positions, other_recording.markers.positions):
             code = "S302"
-        elif _same_forces(recording, two) and _overlap(_span(recording), _span(two)):
+        elif _same_forces(recording, other_recording) and _overlap(_span(recording), _span(other_recording)):
             code = "S303"
         else:
             continue
         yield finding(code, Where(trial=other.name), other_trial=Quantity(first.name))
 
 
-def _same(positions: np.ndarray, two: np.ndarray) -> bool:
-    return positions.shape == two.shape and bool(np.array_equal(positions, two, equal_nan=True))
+def _same(positions: np.ndarray, reference: np.ndarray) -> bool:
+    return positions.shape == reference.shape and bool(np.array_equal(positions, reference, equal_nan=True))
 
 
 def _same_forces(first: Recording, other: Recording) -> bool:
@@ -338,5 +338,5 @@ def _span(recording: Recording) -> tuple[float, float]:
     return float(recording.markers.time[0]), float(recording.markers.time[-1])
 
 
-def _overlap(span: Span, two: Span) -> bool:
-    return span is None or two is None or (span[0] < two[1] and two[0] < span[1])
+def _overlap(span: Span, second: Span) -> bool:
+    return span is None or second is None or (span[0] < second[1] and second[0] < span[1])

@@ -108,8 +108,8 @@ def trial_scales(context: PersonContext) -> Iterator[Finding]:
     if marker_set is None:
         return
 
-    def between(recording: RecordingContext, two: RecordingContext, usual: float = 0.0) -> CameraScale | None:
-        return _scale(SegmentDistances.of(recording.all_markers, two.all_markers, marker_set), usual)
+    def between(recording: RecordingContext, reference: RecordingContext, usual: float = 0.0) -> CameraScale | None:
+        return _scale(SegmentDistances.of(recording.all_markers, reference.all_markers, marker_set), usual)
 
     def size(scale: CameraScale | None) -> float:
         return np.nan if scale is None else abs(scale.error)

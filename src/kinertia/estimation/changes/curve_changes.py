@@ -132,8 +132,10 @@ def curve_changes(before: Rows, after: Rows, measured: Measured) -> Iterator[Cur
     random = np.random.default_rng(_SEED)
     for (name, side), phase in best.items():
         compared = first[name, side, phase], second[name, side, phase]
-        other = {"r": "l", "l": "r"}.get(side, side)
-        mirrored = [conditions.get((name, other, best.get((name, other), phase))) for conditions in (first, second)]
+        opposite = {"r": "l", "l": "r"}.get(side, side)
+        mirrored = [
+            conditions.get((name, opposite, best.get((name, opposite), phase))) for conditions in (first, second)
+        ]
         yield _compared(name, side, phase, compared, mirrored, measured, random)
 
 
@@ -189,8 +191,8 @@ def _compared(
     factor = np.nan
     if judged:
         errors = _departed(departures, variance, random)
-        for condition, of_one, freely, other in zip(compared, of_strides, freedom, mirrored, strict=True):
-            errors = errors + _strayed(condition, other, of_one, freely, random)
+        for condition, of_one, freely, mirror in zip(compared, of_strides, freedom, mirrored, strict=True):
+            errors = errors + _strayed(condition, mirror, of_one, freely, random)
         with np.errstate(invalid="ignore", divide="ignore"):
             most = np.nanmax(np.where(total > 0.0, np.abs(errors) / np.sqrt(total), 0.0), axis=1)
         factor = float(np.quantile(most, _SHARE))

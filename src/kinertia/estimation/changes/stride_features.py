@@ -211,12 +211,12 @@ class _Strides:
                 if load_edge[1:] == (side, kind)
             ]
             moved.append([_later(stride, side, kind, edges) for stride in of_trial])
-        other = {
+        later_by_id = {
             id(stride): later
             for of_trial, new in zip(self.strides, moved, strict=True)
             for stride, later in zip(of_trial, new, strict=True)
         }
-        return replace(self, strides=moved, of_curve=[other[id(stride)] for stride in self.of_curve])
+        return replace(self, strides=moved, of_curve=[later_by_id[id(stride)] for stride in self.of_curve])
 
     def chosen(self, shown: np.ndarray) -> tuple[list[Key], np.ndarray, np.ndarray]:
         """Return keys, weights (k, 5, 101) of EVENTS, and which are kept as curves, of the curves shown."""
@@ -228,8 +228,10 @@ class _Strides:
 def _later(stride: Stride, side: str, kind: str, edges: Sequence[float]) -> Stride:
     """Return a stride with this kind of contact later where it is at none of the edges (s) of loads."""
     end = "toe off" if stride.phase == "stance" else "heel strike"
-    same_foot, other = {"start_s": "heel strike", "end_s": end, "toe_off_s": "toe off"}, _OPPOSITE
-    names = [name for name, edge_kind in (same_foot if stride.side == side else other).items() if edge_kind == kind]
+    same_foot, other_foot = {"start_s": "heel strike", "end_s": end, "toe_off_s": "toe off"}, _OPPOSITE
+    names = [
+        name for name, edge_kind in (same_foot if stride.side == side else other_foot).items() if edge_kind == kind
+    ]
     times = {name: float(getattr(stride, name)) for name in names}
     later: dict[str, Any] = {
         name: time + CONTACT_SD_S

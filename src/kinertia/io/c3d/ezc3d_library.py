@@ -95,8 +95,8 @@ def _retype(parameters: Any) -> bool:
     changed = False
     for name, kind in _PLATE_TYPES.items():
         values = np.array(parameter_values(parameters, "FORCE_PLATFORM", name))
-        other = np.floating if kind == _INTEGER else np.integer
-        if len(values) and np.issubdtype(values.dtype, other) and (values == np.round(values)).all():
+        opposite_kind = np.floating if kind == _INTEGER else np.integer
+        if len(values) and np.issubdtype(values.dtype, opposite_kind) and (values == np.round(values)).all():
             entry = parameters["FORCE_PLATFORM"][name]
             entry["type"] = kind
             entry["value"] = np.asarray(entry["value"]).astype(np.int32 if kind == _INTEGER else float)

@@ -116,12 +116,12 @@ class InstrumentInformation:
         here = np.concatenate([here, size + np.arange(len(FLOOR_UNKNOWNS) + 1)])
         information, rhs = np.zeros((size + len(FLOOR_UNKNOWNS) + 1,) * 2), np.zeros(size + len(FLOOR_UNKNOWNS) + 1)
         information[np.ix_(here, here)], rhs[here] = self.information, self.rhs
-        other = np.arange(per_plate * len(plates), size)
-        kept = np.setdiff1d(np.arange(len(rhs)), other)
+        absent = np.arange(per_plate * len(plates), size)
+        kept = np.setdiff1d(np.arange(len(rhs)), absent)
         deviations = np.tile([prior.plate[name].sd for name in PLATE_UNKNOWNS], len(every) - len(plates))
-        eliminated = information[np.ix_(other, other)] + np.diag(1.0 / np.square(deviations))
-        through = np.linalg.solve(eliminated, np.column_stack([information[np.ix_(other, kept)], rhs[other]]))
-        across = information[np.ix_(kept, other)]
+        eliminated = information[np.ix_(absent, absent)] + np.diag(1.0 / np.square(deviations))
+        through = np.linalg.solve(eliminated, np.column_stack([information[np.ix_(absent, kept)], rhs[absent]]))
+        across = information[np.ix_(kept, absent)]
         return InstrumentInformation(
             tuple(plates),
             information[np.ix_(kept, kept)] - across @ through[:, :-1],

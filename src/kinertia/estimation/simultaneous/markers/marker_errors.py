@@ -75,14 +75,14 @@ class ErrorProcess(NamedTuple):
     @property
     def new(self) -> float:
         """Innovation variance of a process of unit variance: what the two frames before do not predict."""
-        lag1, two = self.of_before
-        return (1.0 + two) * ((1.0 - two) ** 2 - lag1**2) / (1.0 - two)
+        lag1, lag2 = self.of_before
+        return (1.0 + lag2) * ((1.0 - lag2) ** 2 - lag1**2) / (1.0 - lag2)
 
     @property
     def frames(self) -> float:
         """Number of neighbouring frames over which its errors are correlated."""
-        lag1, two = self.of_before
-        return self.new / (1.0 - lag1 - two) ** 2
+        lag1, lag2 = self.of_before
+        return self.new / (1.0 - lag1 - lag2) ** 2
 
     @classmethod
     def read(cls, frames: float, products: np.ndarray) -> tuple[Self, float]:
@@ -125,18 +125,18 @@ class ErrorInformation:
     @classmethod
     def of(cls, seen: np.ndarray, sd_m: np.ndarray, process: ErrorProcess) -> Self:
         """Compute the information for markers seen (n, m), with standard deviations sd_m (m,)."""
-        lag1, two = process.of_before
+        lag1, lag2 = process.of_before
         n, m = seen.shape
         diagonal, after, second = np.zeros((n, m)), np.zeros((max(n - 1, 0), m)), np.zeros((max(n - 2, 0), m))
         three = (seen[2:] & seen[1:-1] & seen[:-2]) / process.new
         # correlation of neighbours
-        alike = lag1 / (1.0 - two)
+        alike = lag1 / (1.0 - lag2)
         diagonal[2:] += three
         diagonal[1:-1] += lag1 * lag1 * three
-        diagonal[:-2] += two * two * three
+        diagonal[:-2] += lag2 * lag2 * three
         after[1:] -= lag1 * three
-        after[:-1] += lag1 * two * three
-        second -= two * three
+        after[:-1] += lag1 * lag2 * three
+        second -= lag2 * three
         before = np.vstack([np.zeros((1, m), dtype=bool), seen[:-1]])
         # the first two frames after a gap
         pair = (seen[1:] & seen[:-1] & ~before[:-1]) / (1.0 - alike * alike)

@@ -248,9 +248,9 @@ def _expected(problem: MapProblem, k: int, band_hz: float) -> np.ndarray:
     step_s = float(np.median(np.diff(trial.time)))
     hz = np.linspace(0.0, band_hz, _FREQUENCIES)
     process = trial.marker_process[1]
-    lag1, two = process.of_before
+    lag1, lag2 = process.of_before
     turn = np.exp(-2j * np.pi * step_s * hz)
-    power = 2.0 * step_s * process.new / np.square(np.abs(1.0 - lag1 * turn - two * turn**2)) / trial.repeats
+    power = 2.0 * step_s * process.new / np.square(np.abs(1.0 - lag1 * turn - lag2 * turn**2)) / trial.repeats
     return np.array([np.trapezoid(power * (2.0 * np.pi * hz) ** (2 * order), hz) for order in range(3)])
 
 

@@ -149,12 +149,12 @@ def mahalanobis_distance(
 def _alike(segments: Sequence[str], moved: np.ndarray, k: int) -> bool:
     """Decide whether segment k and its other side changed (s, 10) equally in the parameter that changed most."""
     name = segments[k]
-    other = name[:-1] + {"r": "l", "l": "r"}.get(name[-1], "")
-    if name[-2:] not in ("_r", "_l") or other not in segments:
+    opposite = name[:-1] + {"r": "l", "l": "r"}.get(name[-1], "")
+    if name[-2:] not in ("_r", "_l") or opposite not in segments:
         return False
     most = int(np.argmax(np.abs(moved[k])))
     sign = -1.0 if most in _MIRRORED else 1.0
-    return bool(sign * moved[segments.index(other), most] / moved[k, most] > _ALIKE)
+    return bool(sign * moved[segments.index(opposite), most] / moved[k, most] > _ALIKE)
 
 
 @dataclass(frozen=True, eq=False)
