@@ -64,7 +64,10 @@ def main(folder: Path, window_s: tuple[float, float] | None = None) -> kinertia.
     # 6. Look at it before believing it.
     print(fit.overview.line)
     print(*(found.line() for found in fit.overview.open), sep="\n")
-    print(*(f"{one.output}: {one.use}; {one.reason}" for one in kinertia.suitability(fit, fit.findings)), sep="\n")
+    print(
+        *(f"{rating.output}: {rating.use}; {rating.reason}" for rating in kinertia.suitability(fit, fit.findings)),
+        sep="\n",
+    )
     print(fit.bsp[fit.bsp.parameter == "mass"][["segment", "literature", "estimate", "sd", "evidence"]].to_string())
     knee_moment = fit.trials[0].moments["estimate"]["knee_angle_r"]
     print(f"right knee moment from {knee_moment.min():.0f} to {knee_moment.max():.0f} N m")

@@ -58,16 +58,18 @@ def _codemeta(citation: dict[str, Any], project: dict[str, Any]) -> dict[str, An
         "keywords": citation["keywords"],
         "programmingLanguage": "Python",
         "runtimePlatform": f"Python {project['requires-python']}",
-        "operatingSystem": [each.split(" :: ")[-1] for each in project["classifiers"] if "Operating" in each],
+        "operatingSystem": [
+            classifier.split(" :: ")[-1] for classifier in project["classifiers"] if "Operating" in classifier
+        ],
         "codeRepository": urls["Homepage"],
         "issueTracker": urls["Issues"],
         "softwareHelp": urls["Documentation"],
-        "softwareRequirements": [each.partition(";")[0].strip() for each in project["dependencies"]],
+        "softwareRequirements": [dependency.partition(";")[0].strip() for dependency in project["dependencies"]],
     }
 
 
 def _recipe(citation: dict[str, Any], project: dict[str, Any]) -> str:
-    needed = sorted({_conda(each) for each in project["dependencies"] if "<" not in each})
+    needed = sorted({_conda(dependency) for dependency in project["dependencies"] if "<" not in dependency})
     oldest = project["requires-python"].removeprefix(">=")
     return f"""\
 # Written by release/metadata.py for conda-forge/staged-recipes; the hash is the index's, once the version is there.
@@ -102,7 +104,7 @@ requirements:
     - hatch-vcs
   run:
     - python >=${{{{ python_min }}}}
-{chr(10).join(f"    - {each}" for each in needed)}
+{chr(10).join(f"    - {dependency}" for dependency in needed)}
 
 tests:
   - python:

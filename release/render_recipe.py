@@ -5,4 +5,4 @@ from pathlib import Path
 from rattler_build import Stage0Recipe
 
 text = (Path(__file__).parent / "conda" / "recipe.yaml").read_text(encoding="utf-8")
-assert [str(one) for one in Stage0Recipe.from_yaml(text).render()]
+assert [str(part) for part in Stage0Recipe.from_yaml(text).render()]

@@ -14,7 +14,7 @@ def told(*arguments, status=0):
 
 
 def facts_of(content):
-    return {one["name"]: one["facts"] for one in content["recordings"]}
+    return {recording["name"]: recording["facts"] for recording in content["recordings"]}
 
 
 def text_of_page(path):

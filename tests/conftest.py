@@ -173,9 +173,9 @@ def fit_with_model(request, synthetic_lab, tmp_path_factory):
     def get(name: str, calibrate: bool) -> Path:
         def make(folder: Path) -> Path:
             subject = folder / f"{name}.toml"
-            own = name == "synthetic"
-            data = synthetic_lab if own else request.getfixturevalue("measured_folder")
-            person = WITH_MODEL if own else osim_models.PEOPLE[name]
+            synthetic = name == "synthetic"
+            data = synthetic_lab if synthetic else request.getfixturevalue("measured_folder")
+            person = WITH_MODEL if synthetic else osim_models.PEOPLE[name]
             subject.write_text(osim_models.subject_file(data, person, calibrate))
             return fitted(folder / "out", subject).folder
 

@@ -18,7 +18,7 @@ def feet_of(recording):
     """Labels on the right ("r") and left ("l") foot of a recording, those that it has."""
     labels = recording.markers.labels
     feet = marker_set_for(labels).foot_labels()
-    return {side: [label for label in own if label in labels] for side, own in feet.items()}
+    return {side: [label for label in of_side if label in labels] for side, of_side in feet.items()}
 
 
 def context_of(recording, feet=None, **more):
@@ -44,12 +44,16 @@ def place_findings(recording, feet=None, context=None, **more):
 def doubted(recording, feet=None, **more):
     """Codes of what is not explained by another finding and above CORRECTED."""
     found = place_findings(recording, feet, **more)
-    return [one.code for one in found if one.is_open and one.severity > Severity.CORRECTED]
+    return [finding.code for finding in found if finding.is_open and finding.severity > Severity.CORRECTED]
 
 
 def error_of(recording, feet=None, **more):
     """The ERROR of the competition of places, rates and delays, or None."""
-    found = [one for one in place_findings(recording, feet, **more) if one.code in COMPETING and one.muted_by is None]
-    errors = [one for one in found if one.severity is Severity.ERROR]
-    assert len({one.code for one in errors}) <= 1
+    found = [
+        finding
+        for finding in place_findings(recording, feet, **more)
+        if finding.code in COMPETING and finding.muted_by is None
+    ]
+    errors = [finding for finding in found if finding.severity is Severity.ERROR]
+    assert len({finding.code for finding in errors}) <= 1
     return errors[0] if errors else None

@@ -42,11 +42,11 @@ class MadeCodes:
         )
         complete = Finding.__post_init__
 
-        def looked_at(one: Finding) -> None:
-            complete(one)
-            if one.code not in self.codes | self.unfilled and made_by_program():
-                filled = not re.search(r"\{\w+(:[+%#]*)?\}", f"{one.message} {one.effect} {one.remedy}")
-                (self.codes if filled else self.unfilled).add(one.code)
+        def looked_at(finding: Finding) -> None:
+            complete(finding)
+            if finding.code not in self.codes | self.unfilled and made_by_program():
+                filled = not re.search(r"\{\w+(:[+%#]*)?\}", f"{finding.message} {finding.effect} {finding.remedy}")
+                (self.codes if filled else self.unfilled).add(finding.code)
 
         Finding.__post_init__ = looked_at  # type: ignore[method-assign]
 

@@ -18,7 +18,7 @@ def context_of(markers: Markers | Recording, marker_set: MarkerSet | None = None
 
 def codes(findings: Iterable[Finding]) -> list[str]:
     """Of findings, in their order."""
-    return [one.code for one in findings]
+    return [finding.code for finding in findings]
 
 
 def relabelled(markers: Markers, *pairs: tuple[str, str]) -> Markers:

@@ -29,8 +29,8 @@ def person(
     stated = Subject(name="person", **subject)
     total = None if stated.mass_kg is None else TotalMass.of(stated.mass_kg, attached)
     still = None if static is None else RecordingContext(static, marker_set, is_static=True)
-    moving = [RecordingContext(one, marker_set, still) for one in trials]
-    others = [RecordingContext(one, marker_set, is_static=True) for one in more_statics]
+    moving = [RecordingContext(trial, marker_set, still) for trial in trials]
+    others = [RecordingContext(more_static, marker_set, is_static=True) for more_static in more_statics]
     return PersonContext(stated, moving, still, marker_set, None, False, total, (), others)
 
 
@@ -62,4 +62,4 @@ def scaled(markers: Markers, factor: float) -> Markers:
 
 def codes(findings: Sequence[Finding]) -> list[str]:
     """Of findings."""
-    return [one.code for one in findings]
+    return [finding.code for finding in findings]

@@ -43,7 +43,7 @@ def tall(share, patched):
 
 def on_a_block(height_m):
     marks = {f"{name}_{side}": (f"{side}{name}",) for name in ("heel", "metatarsal") for side in "rl"}
-    labels = tuple(label for own in marks.values() for label in own)
+    labels = tuple(label for mark in marks.values() for label in mark)
     places = np.zeros((20, 4, 3))
     places[:, ::2, 1] = height_m
     return flat_feet(context_of(Markers(np.arange(20) / 100, labels, places), MarkerSet("feet", marks, {}, {})))
@@ -117,7 +117,7 @@ def late(seconds, patched, uneven_s=0.0):
     patched.setattr(contact_delays, "contacts_of", lambda plates, feet: [SimpleNamespace(distance_m=0.0)])
     context = plates_alone(plates(STEADY, np.full(200, 0.5)))
     made = SimpleNamespace(plates=context.plates, foot_trajectories=(), whole_contacts=(), at=at)
-    return [one.finding for one in contact_delays.contact_delays(made)]
+    return [contact_delay.finding for contact_delay in contact_delays.contact_delays(made)]
 
 
 def moved_by_forces(ratio):
@@ -134,8 +134,8 @@ def uneven(seconds, short=False):
 
 def belt(feet_m_s, patched, stated_m_s=2.0):
     patched.setattr(force_timing, "standing_speeds", lambda markers, feet: (feet_m_s, feet_m_s))
-    own = SimpleNamespace(distance_m=lambda start, end: stated_m_s * (end - start))
-    stated = SimpleNamespace(under=lambda foot: own, speed_m_s=np.array([stated_m_s]))
+    belt_of_foot = SimpleNamespace(distance_m=lambda start, end: stated_m_s * (end - start))
+    stated = SimpleNamespace(under=lambda foot: belt_of_foot, speed_m_s=np.array([stated_m_s]))
     markers, recording = SimpleNamespace(time=FEW / 100), SimpleNamespace(belt=stated)
     return force_timing.belt_speed(SimpleNamespace(recording=recording, all_markers=markers, feet=object(), at=at))
 

@@ -31,7 +31,7 @@ def found_in(context):
 
 def codes(findings):
     """Of findings that no other explains."""
-    return [one.code for one in findings if one.is_open]
+    return [finding.code for finding in findings if finding.is_open]
 
 
 def with_force(walk, change, torque=1.0):

@@ -102,18 +102,18 @@ def lost(seconds=0.03, before_n=600.0):
     """A plate reads nothing for so long, after a load of this size; a second one is loaded all the time."""
     vertical = noisy_step(swing_n=0.0)
     vertical[480:500] = before_n
-    one = plates(vertical, np.full(1000, 0.5), across_n=10.0 + vertical / 100)
-    force = np.concatenate([one.force, one.force[::-1]], axis=1)
+    plate = plates(vertical, np.full(1000, 0.5), across_n=10.0 + vertical / 100)
+    force = np.concatenate([plate.force, plate.force[::-1]], axis=1)
     force[500 : 500 + round(1000 * seconds), 0] = 0.0
-    moment = np.concatenate([one.moment, one.moment], axis=1)
-    return signals(plates_alone(PlateLoads(one.time, ("plate", "other"), force, moment, (None, None))))
+    moment = np.concatenate([plate.moment, plate.moment], axis=1)
+    return signals(plates_alone(PlateLoads(plate.time, ("plate", "other"), force, moment, (None, None))))
 
 
 def repeated(seconds):
-    one = plates(noisy_step(), np.full(1000, 0.5), across_n=noisy_step() / 10)
+    plate = plates(noisy_step(), np.full(1000, 0.5), across_n=noisy_step() / 10)
     span = slice(500, 501 + round(1000 * seconds))
-    one.force[span], one.moment[span] = one.force[500], one.moment[500]
-    return signals(plates_alone(one))
+    plate.force[span], plate.moment[span] = plate.force[500], plate.moment[500]
+    return signals(plates_alone(plate))
 
 
 def saturated(seconds):
@@ -171,11 +171,11 @@ def raised(height_m, patched):
     return plate_positions.plate_heights(SimpleNamespace(trials=[SimpleNamespace(at=at)]))
 
 
-def progressing(patched, one=0.3, other=0.3, range_m=0.1):
+def progressing(patched, first=0.3, other=0.3, range_m=0.1):
     """Steps on two plates, with these shares of the foot from heel to toe, and this range of the first."""
     steps = [
         SimpleNamespace(plate=p, foot=p, is_step=True, place=np.array([[0.0, 0.0], [size, 0.0]]), share=share)
-        for p, (share, size) in enumerate(((one, range_m), (other, 0.1)))
+        for p, (share, size) in enumerate(((first, range_m), (other, 0.1)))
     ]
     patched.setattr(cop_positions, "heel_steps", lambda context: steps)
     patched.setattr(cop_positions, "_progression_m", lambda step, foot: 0.2 * step.share)
@@ -197,17 +197,17 @@ def untwisted(peak_nm):
 
 def repeated_plate(share):
     """A plate, and another that reads the same but for this share of its peak."""
-    one = plates(700.0 * np.sin(np.linspace(0.0, np.pi, 200)), np.full(200, 0.5))
-    force = np.concatenate([one.force, one.force], axis=1)
+    plate = plates(700.0 * np.sin(np.linspace(0.0, np.pi, 200)), np.full(200, 0.5))
+    force = np.concatenate([plate.force, plate.force], axis=1)
     force[:, 1, 0] += share * 700.0 * np.where(FEW % 2, 1.0, -1.0)
-    corners = np.concatenate([one.corners, one.corners + 2.0])
-    both = PlateLoads(one.time, ("one", "other"), force, np.zeros_like(force), (None, None), corners)
+    corners = np.concatenate([plate.corners, plate.corners + 2.0])
+    both = PlateLoads(plate.time, ("one", "other"), force, np.zeros_like(force), (None, None), corners)
     return repeated_plates(plates_alone(both))
 
 
 def standing_by(distance_m):
     contacts = [
-        SimpleNamespace(distance_m=each, between=False, time=np.arange(3.0), plate=0) for each in (0, 0, distance_m)
+        SimpleNamespace(distance_m=offset, between=False, time=np.arange(3.0), plate=0) for offset in (0, 0, distance_m)
     ]
     feet = (SimpleNamespace(seen=lambda time: np.ones(len(time))),) * 2
     named = SimpleNamespace(names=("plate",))
@@ -283,7 +283,7 @@ PLATE_LIMITS = {
     "P245 most": (off_the_plate, 0.499, 0.501, ["WARNING"], ["ERROR"]),
     "P249 height": (raised, 0.0001, -0.0001, [], ["WARNING"]),
     "P251 fixed": (lambda m, patched: progressing(patched, range_m=m), 0.0021, 0.0019, [], ["WARNING"]),
-    "P252 backwards": (lambda share, patched: progressing(patched, one=share), -0.34, -0.36, [], ["WARNING"]),
+    "P252 backwards": (lambda share, patched: progressing(patched, first=share), -0.34, -0.36, [], ["WARNING"]),
     "P252 forwards": (lambda share, patched: progressing(patched, -0.5, share), 0.24, 0.26, [], ["WARNING"]),
     "P261 lever_arm": (columns, 0.0049, 0.0051, [], ["WARNING"]),
     "P264 absent": (untwisted, 0.0051, 0.0049, [], ["WARNING"]),

@@ -67,22 +67,29 @@ def _write_person(folder: Path, seed: int) -> None:
 
 def with_qualisys_labels(person: SyntheticSubject) -> SyntheticSubject:
     """The same person with the markers of the preset `qualisys-lower-body`."""
-    markers, own = person.static.markers, {marker.label: marker.position for marker in person.skeleton.markers}
+    markers, positions = person.static.markers, {marker.label: marker.position for marker in person.skeleton.markers}
     q = solve_ik(person.skeleton, markers).q[:1]
     up, side_way = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
-    placed = [Marker(label, "pelvis", own[old]) for label, old in _ON_PELVIS.items()]
-    placed += [Marker("CV7", "torso", own["Sternum"] + [-0.16, 0.09, 0.0]), Marker("SJN", "torso", own["Sternum"])]
-    placed.append(Marker("SXS", "torso", own["Sternum"] + [0.03, -0.14, 0.0]))
+    placed = [Marker(label, "pelvis", positions[old]) for label, old in _ON_PELVIS.items()]
+    placed += [
+        Marker("CV7", "torso", positions["Sternum"] + [-0.16, 0.09, 0.0]),
+        Marker("SJN", "torso", positions["Sternum"]),
+    ]
+    placed.append(Marker("SXS", "torso", positions["Sternum"] + [0.03, -0.14, 0.0]))
     for side, sign in (("R", 1.0), ("L", -1.0)):
         low = side.lower()
-        placed.append(Marker(f"{side}_IPS", "pelvis", own["V.Sacral"] + 0.045 * sign * side_way))
-        placed.append(Marker(f"{side}_SAE", "torso", own[f"{side}.Acromium"]))
+        placed.append(Marker(f"{side}_IPS", "pelvis", positions["V.Sacral"] + 0.045 * sign * side_way))
+        placed.append(Marker(f"{side}_SAE", "torso", positions[f"{side}.Acromium"]))
         for code, (segment, old) in _ON_LEG.items():
-            placed.append(Marker(f"{side}_{code}", f"{segment}_{low}", own[f"{side}.{old}"]))
+            placed.append(Marker(f"{side}_{code}", f"{segment}_{low}", positions[f"{side}.{old}"]))
         for code, (segment, old, above) in _BESIDE.items():
-            place = own[f"{side}.{old}"] + above * up + (0.02 * sign * side_way if code != "TTC" else [0.05, 0.0, 0.0])
+            place = (
+                positions[f"{side}.{old}"]
+                + above * up
+                + (0.02 * sign * side_way if code != "TTC" else [0.05, 0.0, 0.0])
+            )
             placed.append(Marker(f"{side}_{code}", f"{segment}_{low}", place))
-        between = (own[f"{side}.Toe.Med"] + own[f"{side}.Toe.Lat"]) / 2.0
+        between = (positions[f"{side}.Toe.Med"] + positions[f"{side}.Toe.Lat"]) / 2.0
         placed.append(Marker(f"{side}_FM2", f"foot_{low}", between + 0.01 * up))
     skeleton = person.skeleton.with_markers(placed)
     places = np.repeat(skeleton.marker_positions(skeleton.pose(q)), len(markers.time), axis=0)

@@ -32,7 +32,7 @@ def random_chain(rng: np.random.Generator, clamped: bool = True) -> Skeleton:
             joints.append(Joint(parent, child, turned, rng.uniform(-0.4, 0.4, 3), axes))
             markers += _markers(rng, child)
             parent = child
-    start = {name: one.middle for name, one in ranges.items()}
+    start = {name: limits.middle for name, limits in ranges.items()}
     return Skeleton("chain", tuple(joints), tuple(markers), ranges=ranges, start=start)
 
 

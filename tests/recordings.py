@@ -45,8 +45,8 @@ def named_here(recordings: dict[K, V]) -> dict[K, V]:
 
 def marker_set_for(labels: Sequence[str]) -> MarkerSet:
     """The preset that fits these labels, or the set of subject4's laboratory."""
-    own = Path(__file__).parent / "subject4.toml"
-    return read_marker_set(own) if "r_calc" in labels else choose_marker_set(labels)
+    file = Path(__file__).parent / "subject4.toml"
+    return read_marker_set(file) if "r_calc" in labels else choose_marker_set(labels)
 
 
 def slow_beside(quick: Iterable[K], names: Iterable[K]) -> list[Any]:

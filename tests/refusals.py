@@ -50,12 +50,12 @@ def expect_filled(found: Finding) -> None:
 
 def codes(findings: Sequence[Finding]) -> list[str]:
     """Their codes, in order."""
-    return [one.code for one in findings]
+    return [finding.code for finding in findings]
 
 
 def only(findings: Sequence[Finding], code: str, /, **evidence: Any) -> Finding:
     """The one finding of this code, with this evidence."""
-    (found,) = [one for one in findings if one.code == code]
+    (found,) = [finding for finding in findings if finding.code == code]
     expect_evidence(found, **evidence)
     expect_filled(found)
     return found

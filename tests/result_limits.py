@@ -66,9 +66,9 @@ def residual(size, column, peak=False, external_n=1e6, mass_kg=0.0):
     left[: 1 if peak else None, column] = size
     loads = np.zeros((10_000, 2, 6))
     loads[:, 0, 1] = external_n
-    each = {"estimate": left}
+    stages = {"estimate": left}
     kinematics = SimpleNamespace(foot_loads=loads, complete=True)
-    trial = SimpleNamespace(name="walk", residuals=each, full_residuals=each, kinematics=kinematics, motion_hz=6.0)
+    trial = SimpleNamespace(name="walk", residuals=stages, full_residuals=stages, kinematics=kinematics, motion_hz=6.0)
     return residuals_of(trial, mass_kg)
 
 
@@ -174,8 +174,8 @@ def centre_off(distance_m):
 
 
 def unlike_others(size):
-    one, other = (error(GAIN, value, 0.01, 1.0 / np.sqrt(2.0), "1") for value in (size, 0.0))
-    return session_contradictions("person", [one], [other])
+    of_person, other = (error(GAIN, value, 0.01, 1.0 / np.sqrt(2.0), "1") for value in (size, 0.0))
+    return session_contradictions("person", [of_person], [other])
 
 
 # models
@@ -186,9 +186,9 @@ def of_femur(check, **values):
 
 
 def massive(mass_kg):
-    own = upright.bsp()
-    factor = mass_kg / own.total_mass_kg
-    bsp = BodySegmentParameters(own.segments, factor * own.mass_kg, own.com_m, factor * own.inertia_kgm2)
+    body = upright.bsp()
+    factor = mass_kg / body.total_mass_kg
+    bsp = BodySegmentParameters(body.segments, factor * body.mass_kg, body.com_m, factor * body.inertia_kgm2)
     return with_model(upright.skeleton(), bsp)
 
 
@@ -209,14 +209,14 @@ def without_inertia(mass_kg):
 
 
 def stated(ratio, trials=()):
-    own = upright.bsp().total_mass_kg
-    return model_mass(replace(with_model(upright.skeleton(), upright.bsp(), mass_kg=own / ratio), trials=trials))
+    body = upright.bsp().total_mass_kg
+    return model_mass(replace(with_model(upright.skeleton(), upright.bsp(), mass_kg=body / ratio), trials=trials))
 
 
 def uneven_sides(name, size):
     """A right femur whose mass, centre or moment differs from the left one's: by a share, or by a distance."""
-    own = upright.bsp()
-    value = own.table()[own.segments.index("femur_r"), PARAMETERS.index(name)]
+    body = upright.bsp()
+    value = body.table()[body.segments.index("femur_r"), PARAMETERS.index(name)]
     return of_femur(sides, **{name: value + size if name == "com_x" else value * (1.0 + size)})
 
 

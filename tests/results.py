@@ -31,7 +31,7 @@ def entry_of(fit, quantity, **where):
     """The one entry of an estimate's calibration of this quantity and place."""
     wanted = {"quantity": quantity, "trial": None, "axis": None, **where}
     (found,) = [
-        one for one in fit.posterior.calibration if all(getattr(one, name) == at for name, at in wanted.items())
+        entry for entry in fit.posterior.calibration if all(getattr(entry, name) == at for name, at in wanted.items())
     ]
     return found
 
@@ -80,7 +80,7 @@ def well_known(plates=("left",)):
 
 def codes(findings):
     """Codes of findings, in their order."""
-    return [one.code for one in findings]
+    return [finding.code for finding in findings]
 
 
 def of_estimate(fitted, *names, literature=None):
@@ -111,4 +111,8 @@ def of_estimate(fitted, *names, literature=None):
     )
     made = ResultContext(fit, ready)
     made.__dict__["force_masses"] = {}
-    return [one for one in explained(asked(ESTIMATE_CHECKS, made)) if one.is_open and one.severity > Severity.INFO]
+    return [
+        finding
+        for finding in explained(asked(ESTIMATE_CHECKS, made))
+        if finding.is_open and finding.severity > Severity.INFO
+    ]

@@ -15,8 +15,8 @@ from validation.synthetic_walks import kinematics_of
 
 def seen(trial: SyntheticTrial, seed=0, sd_m=0.002, loads=None, name="walk"):
     """Kinematics of the walk with camera noise, and with these foot loads where they are not the true ones."""
-    one = kinematics_of(trial, camera_noise(trial.markers, sd_m, np.random.default_rng(seed)), loads)
-    return replace(one, trial=replace(one.trial, name=name))
+    solved = kinematics_of(trial, camera_noise(trial.markers, sd_m, np.random.default_rng(seed)), loads)
+    return replace(solved, trial=replace(solved.trial, name=name))
 
 
 def estimated(trial: SyntheticTrial, kinematics, literature=None, uncertainty=GAIT27_UNCERTAINTY):

@@ -107,7 +107,7 @@ def slurm_here(folder: Path) -> Iterator[dict[str, str]]:
 def _free_ports(count: int) -> list[int]:
     with contextlib.ExitStack() as stack:
         held = [stack.enter_context(socket.create_server(("127.0.0.1", 0))) for _ in range(count)]
-        return [one.getsockname()[1] for one in held]
+        return [bound.getsockname()[1] for bound in held]
 
 
 def _wait(ready, folder: Path) -> None:

@@ -90,9 +90,9 @@ def small_skin(skeleton: Skeleton, frames: int) -> SkinPatterns:
     """Two segments follow two patterns each, one of them with two markers; the others none."""
     values = np.random.default_rng(3).normal(0.0, 0.3, (frames, 4))
     segments = skeleton.marker_segments
-    one, other = segments[0], segments[-1]
-    first = np.select([segments == one, segments == other], [0, 2])
-    return SkinPatterns(values, first, first + 2 * np.isin(segments, [one, other]))
+    first_segment, other = segments[0], segments[-1]
+    first = np.select([segments == first_segment, segments == other], [0, 2])
+    return SkinPatterns(values, first, first + 2 * np.isin(segments, [first_segment, other]))
 
 
 def small_ground(trial: SyntheticTrial, rng: np.random.Generator) -> FootPlates:
@@ -187,10 +187,10 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
     here = np.array([values[name] for name in trial.ground.plates])[trial.ground.plate_index]
     x, z, gain, free_moment, angle = np.moveaxis(here, -1, 0)
     gains = iter(static[layout[GAINS]])
-    own_gains = [np.array([next(gains) for _ in each.ground.plates]) for each in problem.trials][k]
+    own_gains = [np.array([next(gains) for _ in of_trial.ground.plates]) for of_trial in problem.trials][k]
     gain = gain + own_gains[trial.ground.plate_index]
     zeros = iter(static[layout[ZEROS]].reshape(-1, 2))
-    own_zeros = [np.array([next(zeros) for _ in each.ground.plates]) for each in problem.trials][k]
+    own_zeros = [np.array([next(zeros) for _ in of_trial.ground.plates]) for of_trial in problem.trials][k]
     zero_x, zero_z = np.moveaxis(own_zeros[trial.ground.plate_index], -1, 0)
     middle = trial.ground.middles[trial.ground.plate_index]
     zero = np.stack([zero_x, np.zeros_like(x), zero_z], axis=-1) @ trial.ground.turn.T
@@ -222,9 +222,9 @@ def bending(problem: MapProblem, skeleton: Skeleton, motion: Sequence[np.ndarray
     height = 1.5 * problem.prior.mean.com_m[row, 1]
     steps = 2e-3 * np.arange(-2.0, 3.0)
     poses = [skeleton.pose(q + t * qd + 0.5 * t**2 * qdd) for t in steps]
-    each = np.array([(p.rotation[:, number, :, 1], p.translation[:, number]) for p in poses])
+    axes_and_places = np.array([(p.rotation[:, number, :, 1], p.translation[:, number]) for p in poses])
     weights = np.array([-1.0, 16.0, -30.0, 16.0, -1.0]) / 12.0 / (steps[-1] - steps[-2]) ** 2
-    (along, place), (turned, moved) = each[2], np.tensordot(weights, each, 1)
+    (along, place), (turned, moved) = axes_and_places[2], np.tensordot(weights, axes_and_places, 1)
     specific = np.add(moved, [0.0, skeleton.gravity_m_s2, 0.0])
     moment = np.cross(place, -turned) - np.cross(along, specific + 2.0 * height * turned)
     moment += np.cross([0.0, 1.0, 0.0], force / problem.prior.mass_kg)
@@ -249,10 +249,10 @@ def _body(problem: MapProblem, static: tuple[float, ...]) -> tuple[Skeleton, pin
 
 def process_covariance(process: ErrorProcess, lags: np.ndarray) -> np.ndarray:
     """At these lags, of a second-order autoregressive process of unit variance (Yule and Walker)."""
-    one, two = process.of_before
-    values = [1.0, one / (1.0 - two)]
+    lag1, two = process.of_before
+    values = [1.0, lag1 / (1.0 - two)]
     while len(values) <= np.max(lags):
-        values.append(one * values[-1] + two * values[-2])
+        values.append(lag1 * values[-1] + two * values[-2])
     return np.array(values)[lags]
 
 

@@ -40,12 +40,16 @@ class Refusal:
 
 def blocking(findings):
     """Open errors, in findings as scripts get them, that nothing else explains."""
-    return [one for one in findings if (one["severity"], one["status"], one["muted_by"]) == ("ERROR", "open", None)]
+    return [
+        finding
+        for finding in findings
+        if (finding["severity"], finding["status"], finding["muted_by"]) == ("ERROR", "open", None)
+    ]
 
 
 def blocking_codes(findings):
     """Their codes, each once."""
-    return list(dict.fromkeys(one["code"] for one in blocking(findings)))
+    return list(dict.fromkeys(finding["code"] for finding in blocking(findings)))
 
 
 def refused(lab, walk="walk.trc", **changes):

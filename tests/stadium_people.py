@@ -33,13 +33,15 @@ def stadium_people() -> dict[str, StadiumPerson]:
     rng, usual = np.random.default_rng(95), usual_build()
     people = {}
     for name, size in SIZES.items():
-        own = usual.common @ rng.normal(size=usual.common.shape[1])
-        values = np.exp(usual.log_shape + log_size(*size) + _ALIKE * usual.log_sd * own)
+        build = usual.common @ rng.normal(size=usual.common.shape[1])
+        values = np.exp(usual.log_shape + log_size(*size) + _ALIKE * usual.log_sd * build)
         other = np.exp(_OTHER_SIDE * rng.normal(size=len(values)))
         both = {
             key: value * factor
-            for one, value, apart in zip(measures(), values, other, strict=True)
-            for key, factor in zip(one.keys, (apart, 1.0 / apart), strict=False)
+            for measure, value, apart in zip(measures(), values, other, strict=True)
+            for key, factor in zip(measure.keys, (apart, 1.0 / apart), strict=False)
         }
-        people[name] = StadiumPerson(both, np.array([np.mean([both[key] for key in one.keys]) for one in measures()]))
+        people[name] = StadiumPerson(
+            both, np.array([np.mean([both[key] for key in measure.keys]) for measure in measures()])
+        )
     return people

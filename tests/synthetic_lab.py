@@ -103,7 +103,9 @@ def _write_clusters(folder: Path, person: SyntheticSubject) -> None:
     recorded = _recorded(with_clusters(person), np.random.default_rng(101))
     write_trc(folder / "clusters_static.trc", recorded.static.markers)
     walked = recorded.walk.markers
-    write_trc(folder / "clusters_walk.trc", walked.select([one for one in walked.labels if one not in STATIC_ONLY]))
+    write_trc(
+        folder / "clusters_walk.trc", walked.select([label for label in walked.labels if label not in STATIC_ONLY])
+    )
 
 
 def _with_feet(person: SyntheticSubject) -> SyntheticSubject:
@@ -116,7 +118,7 @@ def _recorded(person: SyntheticSubject, rng: np.random.Generator, manner: Manner
     trial = replace(trial, skeleton=person.moving_skeleton)
     recorded = record(person, trial, LabNoise(), rng, SAMPLES_PER_FRAME)
     widths = person.static.measurements
-    return LabRecordings(*(replace(one, measurements=widths) for one in (recorded.static, recorded.walk)))
+    return LabRecordings(*(replace(recording, measurements=widths) for recording in (recorded.static, recorded.walk)))
 
 
 def _write_trial(folder: Path, name: str, recorded: Recording) -> None:
@@ -194,22 +196,22 @@ def _plug_in_gait(skeleton: Skeleton) -> list[Marker]:
         "RBAK": ("torso", beside("Sternum", -0.19, -0.05, 0.09)),
     }
     for side, sign in (("R", 1.0), ("L", -1.0)):
-        own = side.lower()
+        letter = side.lower()
         places |= {
             f"{side}FHD": ("torso", beside(f"{side}.Temple")),
             f"{side}BHD": ("torso", beside(f"{side}.Temple", x=-0.15)),
             f"{side}SHO": ("torso", beside(f"{side}.Acromium")),
-            f"{side}ELB": (f"upper_arm_{own}", beside(f"{side}.Elbow")),
-            f"{side}WRA": (f"forearm_{own}", beside(f"{side}.Wrist.Med")),
-            f"{side}WRB": (f"forearm_{own}", beside(f"{side}.Wrist.Lat")),
-            f"{side}FIN": (f"forearm_{own}", beside(f"{side}.Wrist.Lat", x=0.03 * sign, y=-0.08 - 0.02 * sign)),
+            f"{side}ELB": (f"upper_arm_{letter}", beside(f"{side}.Elbow")),
+            f"{side}WRA": (f"forearm_{letter}", beside(f"{side}.Wrist.Med")),
+            f"{side}WRB": (f"forearm_{letter}", beside(f"{side}.Wrist.Lat")),
+            f"{side}FIN": (f"forearm_{letter}", beside(f"{side}.Wrist.Lat", x=0.03 * sign, y=-0.08 - 0.02 * sign)),
             f"{side}ASI": ("pelvis", beside(f"{side}.ASIS")),
             f"{side}PSI": ("pelvis", beside("V.Sacral", z=0.045 * sign)),
-            f"{side}THI": (f"thigh_{own}", beside(f"{side}.Knee.Lat", y=0.18, z=0.02 * sign)),
-            f"{side}KNE": (f"thigh_{own}", beside(f"{side}.Knee.Lat")),
-            f"{side}TIB": (f"shank_{own}", beside(f"{side}.Ankle.Lat", y=0.16, z=0.02 * sign)),
-            f"{side}ANK": (f"shank_{own}", beside(f"{side}.Ankle.Lat")),
-            f"{side}HEE": (f"foot_{own}", beside(f"{side}.Heel")),
-            f"{side}TOE": (f"foot_{own}", (beside(f"{side}.Toe.Med") + beside(f"{side}.Toe.Lat")) / 2.0),
+            f"{side}THI": (f"thigh_{letter}", beside(f"{side}.Knee.Lat", y=0.18, z=0.02 * sign)),
+            f"{side}KNE": (f"thigh_{letter}", beside(f"{side}.Knee.Lat")),
+            f"{side}TIB": (f"shank_{letter}", beside(f"{side}.Ankle.Lat", y=0.16, z=0.02 * sign)),
+            f"{side}ANK": (f"shank_{letter}", beside(f"{side}.Ankle.Lat")),
+            f"{side}HEE": (f"foot_{letter}", beside(f"{side}.Heel")),
+            f"{side}TOE": (f"foot_{letter}", (beside(f"{side}.Toe.Med") + beside(f"{side}.Toe.Lat")) / 2.0),
         }
     return [Marker(label, segment, place) for label, (segment, place) in places.items()]

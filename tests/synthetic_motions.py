@@ -168,8 +168,8 @@ class _Run:
 
     def centre_of_mass(self, q: np.ndarray) -> np.ndarray:
         pose = self.skeleton.pose(q)
-        own = [self.skeleton.segments.index(segment) for segment in self.bsp.segments]
-        places = pose.translation[:, own] + np.einsum("nsij,sj->nsi", pose.rotation[:, own], self.bsp.com_m)
+        rows = [self.skeleton.segments.index(segment) for segment in self.bsp.segments]
+        places = pose.translation[:, rows] + np.einsum("nsij,sj->nsi", pose.rotation[:, rows], self.bsp.com_m)
         return np.einsum("s,nsi->ni", self.bsp.mass_kg, places) / self.bsp.total_mass_kg
 
     def centre_path(self, time: np.ndarray) -> np.ndarray:

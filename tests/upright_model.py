@@ -70,11 +70,11 @@ def bsp(arms: bool = True) -> BodySegmentParameters:
 
 def changed(body: str, **values: float) -> BodySegmentParameters:
     """The upright model with some parameters of one body replaced."""
-    own = bsp()
-    table = own.table()
+    usual = bsp()
+    table = usual.table()
     for name, value in values.items():
-        table[own.segments.index(body), PARAMETERS.index(name)] = value
-    return BodySegmentParameters.from_table(own.segments, table)
+        table[usual.segments.index(body), PARAMETERS.index(name)] = value
+    return BodySegmentParameters.from_table(usual.segments, table)
 
 
 def with_moments(body: str, *moments: float, mass: float | None = None) -> BodySegmentParameters:

@@ -45,7 +45,7 @@ def users_model(skeleton: Skeleton, bsp: BodySegmentParameters) -> tuple[Skeleto
         if joint.child.startswith("calcn"):
             toes = (Axis(f"mtp_angle_{side}", "rotation", (0.0, 0.0, 1.0)),)
             joints.append(_joint(joint.child, f"toes_{side}", toes, _place(skeleton, f"{side.upper()}.Toe.Med")))
-    markers = [replace(one, segment=_worn_by(one)) for one in skeleton.markers if one.label != WITHOUT]
+    markers = [replace(marker, segment=_worn_by(marker)) for marker in skeleton.markers if marker.label != WITHOUT]
     moving = ("arm_rot", "pro_sup")
     locked = {name: value for name, value in skeleton.locked.items() if not name.startswith(moving)}
     whole = replace(skeleton, name="user", joints=tuple(joints), markers=tuple(markers), locked=locked)
@@ -60,7 +60,7 @@ def renamed(segment: str) -> str:
 
 
 def _place(skeleton: Skeleton, label: str) -> np.ndarray:
-    return next(one.position for one in skeleton.markers if one.label == label) * [1.0, 1.0, 0.0]
+    return next(marker.position for marker in skeleton.markers if marker.label == label) * [1.0, 1.0, 0.0]
 
 
 def _worn_by(marker: Marker) -> str:
@@ -86,10 +86,10 @@ def _shared(skeleton: Skeleton, bsp: BodySegmentParameters) -> BodySegmentParame
     places = skeleton.pose(np.zeros((1, len(skeleton.coordinates)))).translation[0]
     for side in "rl":
         for kind, other, share in SHARES:
-            one, two = f"{kind}_{side}", f"{other}_{side}"
-            apart = np.subtract(*(places[skeleton.segments.index(name)] for name in (two, one)))
-            mass[two], inertia[two], com[two] = share * mass[one], share * inertia[one], com[one] - apart
-            mass[one], inertia[one] = (1.0 - share) * mass[one], (1.0 - share) * inertia[one]
+            segment, two = f"{kind}_{side}", f"{other}_{side}"
+            apart = np.subtract(*(places[skeleton.segments.index(name)] for name in (two, segment)))
+            mass[two], inertia[two], com[two] = share * mass[segment], share * inertia[segment], com[segment] - apart
+            mass[segment], inertia[segment] = (1.0 - share) * mass[segment], (1.0 - share) * inertia[segment]
     order = [name for name in skeleton.segments if name in mass]
     return BodySegmentParameters(
         tuple(order), *(np.array([values[name] for name in order]) for values in (mass, com, inertia))

@@ -204,8 +204,8 @@ def attainable(prior: BspPrior, root: np.ndarray, rng: np.random.Generator) -> d
     change = vectors @ (np.sqrt(np.maximum(moved, 0.0))[:, None] * rng.standard_normal((len(moved), _TRIES)))
     chances = {}
     for name, columns in CLASSES.items():
-        own, before = (part.reshape(-1, 10, _TRIES)[:, columns] for part in (error, error + change))
-        squares = (np.square(part).sum(axis=(0, 1)) for part in (own, before))
+        after, before = (part.reshape(-1, 10, _TRIES)[:, columns] for part in (error, error + change))
+        squares = (np.square(part).sum(axis=(0, 1)) for part in (after, before))
         chances[name] = float(np.mean(np.less(*squares)))
     return chances
 
@@ -235,7 +235,7 @@ def _class(errors: np.ndarray, before: np.ndarray, sd: np.ndarray, bound: np.nda
     errors, before, sd, bound = (part[left] for part in (errors, before, sd, bound))
     away = errors / sd
     within = np.nanmean(np.where(np.isfinite(away), np.abs(away) < WITHIN, np.nan), axis=(1, 2))
-    each, each_before = (np.nanmean(np.square(part), axis=(1, 2)) for part in (errors, before))
+    by_class, each_before = (np.nanmean(np.square(part), axis=(1, 2)) for part in (errors, before))
     return ClassAccuracy(
         float(within.mean()),
         float(within.std() / np.sqrt(len(within))),
@@ -243,5 +243,5 @@ def _class(errors: np.ndarray, before: np.ndarray, sd: np.ndarray, bound: np.nda
         rms(errors),
         rms(before),
         rms(bound),
-        float(np.mean(each < each_before)),
+        float(np.mean(by_class < each_before)),
     )

@@ -62,7 +62,7 @@ def moments_markdown(accuracies: Mapping[str, ScenarioAccuracy]) -> str:
     """Return one table: per laboratory and joint the RMS error of joint moments, estimate / IK + ID."""
     joints = list(next(iter(accuracies.values())).joints)
     rows = [
-        [scenario.title, *(f"{one.moment_nm:.2f} / {one.usual_nm:.2f}" for one in scenario.joints.values())]
+        [scenario.title, *(f"{joint.moment_nm:.2f} / {joint.usual_nm:.2f}" for joint in scenario.joints.values())]
         for scenario in accuracies.values()
     ]
     return _table(["N m", *joints], rows)

@@ -84,7 +84,7 @@ def calibrated(disturbance: Disturbance, seed: int, duration_s: float = 2.5, com
     centres = dict.fromkeys(HIP_OFFSETS, LARGEST.hips_m)
     free = CalibrationPrior(centres, marker_sd, InstrumentPrior())
     result = estimate(free)
-    entries = {(one.plate, one.quantity, one.axis): one for one in result.calibration if one.trial is None}
+    entries = {(entry.plate, entry.quantity, entry.axis): entry for entry in result.calibration if entry.trial is None}
     plate, delay = entries["right foot", "position", "x"], entries[None, "delay", None]
     deviations = {
         "right plate, x": (disturbance.plate_m - plate.value, plate.sd),

@@ -90,7 +90,7 @@ class Person:
         """Judge the changes from the first to the second or third day (1, 2)."""
         found = changes_between(*(self.unchanged, self.changed)[other_day - 1], fixed_axes=False)
         before, after = self.truth[0], self.truth[other_day]
-        return [Judged(one, after[name] - before[name]) for one in found if (name := outcome(one)) in before]
+        return [Judged(change, after[name] - before[name]) for change in found if (name := outcome(change)) in before]
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,12 +112,12 @@ def person(seed: int) -> Person:
     for later in days[1:]:
         before, after = session_features(session(days[0].fit), session(later.fit), draws=DRAWS)
         pairs.append((before.events, after.events))
-    return Person(seed, pairs[0], pairs[1], tuple(one.truth for one in days))
+    return Person(seed, pairs[0], pairs[1], tuple(recorded_day.truth for recorded_day in days))
 
 
-def outcome(one: Change) -> str:
+def outcome(change: Change) -> str:
     """Return what a change is of, in words."""
-    return " ".join((one.quantity, one.joint, one.component, one.event, one.side))
+    return " ".join((change.quantity, change.joint, change.component, change.event, change.side))
 
 
 def day(subject: SyntheticSubject, manner: Manner, name: str, rng: np.random.Generator) -> Day:
@@ -125,7 +125,7 @@ def day(subject: SyntheticSubject, manner: Manner, name: str, rng: np.random.Gen
     shift = _marker_shifts(subject, rng)
     standing = replace(subject.static, markers=camera_noise(_standing(subject, shift), CAMERA_SD_M, rng))
     manners = [_varied(manner, rng) for _ in range(WALKS)]
-    walks = [walk(subject, WALK_S, PLATES_HZ, manner=each) for each in manners]
+    walks = [walk(subject, WALK_S, PLATES_HZ, manner=day_manner) for day_manner in manners]
     skins = _Skin.draw(walks, rng)
     instruments = _Instruments.draw(rng)
     inputs = []
@@ -162,14 +162,14 @@ def _standing(subject: SyntheticSubject, shift: np.ndarray) -> Markers:
     positions = markers.positions.copy()
     mean = positions.mean(axis=0)
     for segment in skeleton.segments:
-        own = [k for k, marker in enumerate(skeleton.markers) if marker.segment == segment]
-        columns = [markers.labels.index(skeleton.labels[k]) for k in own]
+        rows = [k for k, marker in enumerate(skeleton.markers) if marker.segment == segment]
+        columns = [markers.labels.index(skeleton.labels[k]) for k in rows]
         turn = np.eye(3)
-        if len(own) > 2:
-            local, seen = (each - each.mean(axis=0) for each in (skeleton.marker_locals[own], mean[columns]))
+        if len(rows) > 2:
+            local, seen = (points - points.mean(axis=0) for points in (skeleton.marker_locals[rows], mean[columns]))
             u, _, vt = np.linalg.svd(local.T @ seen)
             turn = vt.T @ np.diag([1.0, 1.0, np.linalg.det(vt.T @ u.T)]) @ u.T
-        positions[:, columns] += shift[own] @ turn.T
+        positions[:, columns] += shift[rows] @ turn.T
     return replace(markers, positions=positions)
 
 
@@ -193,13 +193,14 @@ class _Skin:
     @classmethod
     def draw(cls, walks: Sequence[SyntheticTrial], rng: np.random.Generator) -> "_Skin":
         first, *others = walks
-        linear = SkinMotion.draw(first.skeleton, first.motion.q, rng, [one.motion.q for one in others])
+        linear = SkinMotion.draw(first.skeleton, first.motion.q, rng, [other.motion.q for other in others])
         return cls(linear, ClusterMotion.draw(first.skeleton, rng))
 
     def moved(self, exact: Markers, trial: SyntheticTrial, q: np.ndarray) -> Markers:
         parts = ((LINEAR_SHARE, self.linear), (1.0 - LINEAR_SHARE, self.clusters))
         moved = sum(
-            np.sqrt(share) * (each.moved(exact, trial.skeleton, q).positions - exact.positions) for share, each in parts
+            np.sqrt(share) * (motion.moved(exact, trial.skeleton, q).positions - exact.positions)
+            for share, motion in parts
         )
         return replace(exact, positions=exact.positions + moved)
 
@@ -264,10 +265,10 @@ def _exactly(trial: TrialFit, exact: SyntheticTrial) -> _Exact:
     forces = inverse_dynamics(exact.skeleton, exact.bsp, motion, loads)
     joints = joint_moments(exact.skeleton, exact.bsp, motion, loads)
     known = np.ones_like(curves.known)
-    own = JointCurves(curves.time, known, motion, {"estimate": forces}, {"estimate": joints}, None)
-    strides, phases = (tuple(_at_contacts(one, exact) for one in some) for some in (trial.strides, trial.phases))
+    exact_curves = JointCurves(curves.time, known, motion, {"estimate": forces}, {"estimate": joints}, None)
+    strides, phases = (tuple(_at_contacts(stride, exact) for stride in some) for some in (trial.strides, trial.phases))
     kept = trial.kinematics, exact.skeleton, trial.motion, trial.reactions, trial.joint_loads
-    return _Exact(trial.name, *kept, own, strides, phases)
+    return _Exact(trial.name, *kept, exact_curves, strides, phases)
 
 
 def _at_contacts(stride: Stride, exact: SyntheticTrial) -> Stride:

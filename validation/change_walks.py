@@ -92,15 +92,15 @@ def unchanged_pairs(walker: Walker, rows: Rows) -> Iterator[tuple[np.ndarray, np
             yield trials == first, trials == other
         return
     sides, strides = (np.array([key[k] for key in rows.keys]) for k in (2, 3))
-    numbers = np.array([int(one.split()[-1]) if one.startswith("stride") else -1 for one in strides])
+    numbers = np.array([int(stride.split()[-1]) if stride.startswith("stride") else -1 for stride in strides])
     for trial in walker.trials:
-        own = (trials == trial) & (numbers > 0)
-        halves = np.zeros(len(own), dtype=bool)
+        of_trial = (trials == trial) & (numbers > 0)
+        halves = np.zeros(len(of_trial), dtype=bool)
         for side in "rl":
-            mine = own & (sides == side)
+            mine = of_trial & (sides == side)
             halves |= mine & (numbers <= np.ceil(numbers[mine].max(initial=0) / 2.0))
-        yield own & halves, own & ~halves
-        yield own & (numbers % 2 == 1), own & (numbers % 2 == 0)
+        yield of_trial & halves, of_trial & ~halves
+        yield of_trial & (numbers % 2 == 1), of_trial & (numbers % 2 == 0)
 
 
 def judged_pairs(walker: Walker, rows: Rows) -> list[list[Change]]:
@@ -126,10 +126,10 @@ def alarm_shares(pairs: Sequence[Sequence[Change]]) -> Mapping[str, tuple[int, i
     """Return how many of how many differences are beyond 95 %, by joint group."""
     counts: dict[str, tuple[int, int]] = {}
     for pair in pairs:
-        for one in pair:
-            if (found := beyond(one)) is not None:
-                alarms, all_of = counts.get(group(one), (0, 0))
-                counts[group(one)] = alarms + found, all_of + 1
+        for change in pair:
+            if (found := beyond(change)) is not None:
+                alarms, all_of = counts.get(group(change), (0, 0))
+                counts[group(change)] = alarms + found, all_of + 1
     return counts
 
 
@@ -137,4 +137,4 @@ def instructed_changes(rows: Rows) -> dict[str, list[Change]]:
     """Compare the normal walks of subject4 with each instructed one."""
     trials = np.array([key[0] for key in rows.keys])
     normal = np.isin(trials, NORMAL)
-    return {name: list(changes_of_strides(rows, (normal, trials == one))) for name, one in INSTRUCTED.items()}
+    return {name: list(changes_of_strides(rows, (normal, trials == number))) for name, number in INSTRUCTED.items()}

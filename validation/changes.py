@@ -75,10 +75,10 @@ def share(alarms: int, count: int) -> str:
 
 def alarms_table(pairs: Mapping[str, Sequence[Sequence[Change]]]) -> str:
     """Return how many differences between strides of one condition are beyond 95 %, by joint group and person."""
-    shares = {title: alarm_shares(own) for title, own in pairs.items()}
+    shares = {title: alarm_shares(pairs_of_walker) for title, pairs_of_walker in pairs.items()}
     rows = []
     for name in groups():
-        counts = [one.get(name, (0, 0)) for one in shares.values()]
+        counts = [counted.get(name, (0, 0)) for counted in shares.values()]
         sums = (sum(count[k] for count in counts) for k in (0, 1))
         rows.append([name, *(share(*count) for count in counts), share(*sums)])
     return table(["joint group", *shares, "all"], rows)
@@ -88,13 +88,13 @@ def instructed_table(found: Mapping[str, Sequence[Change]]) -> str:
     """Return the knee adduction moments of normal and instructed walks."""
     rows = []
     for name, changes in found.items():
-        for one in changes:
-            if (one.quantity, one.joint, one.component) == ("moment", "knee", "adduction"):
-                numbers = [f"{value:+.3f}" for value in (one.before, one.after, one.difference)]
-                side = {"r": "right", "l": "left"}[one.side]
-                beyond_95 = {True: "yes", False: "no", None: "unknown"}[beyond(one)]
-                row = [name, side, one.event, *numbers, f"{one.sd:.3f}", f"{one.difference / one.sd:+.1f}"]
-                rows.append([*row, beyond_95, one.verdict])
+        for change in changes:
+            if (change.quantity, change.joint, change.component) == ("moment", "knee", "adduction"):
+                numbers = [f"{value:+.3f}" for value in (change.before, change.after, change.difference)]
+                side = {"r": "right", "l": "left"}[change.side]
+                beyond_95 = {True: "yes", False: "no", None: "unknown"}[beyond(change)]
+                row = [name, side, change.event, *numbers, f"{change.sd:.3f}", f"{change.difference / change.sd:+.1f}"]
+                rows.append([*row, beyond_95, change.verdict])
     heads = ["walk", "leg", "event", "normal", "then", "difference", "SD", "in SDs", "beyond 95 %", "verdict"]
     return table(heads, rows)
 
@@ -110,21 +110,25 @@ def unaffected_table(found: Mapping[str, Sequence[Change]]) -> str:
 
 def coverage_table(people: Sequence[Person]) -> str:
     """Return coverage and false alarms of the synthetic people, by joint group."""
-    days = [[one.judged(day) for one in people] for day in (1, 2)]
+    days = [[walker.judged(day) for walker in people] for day in (1, 2)]
     rows = []
     for name in groups():
         row = [name]
         for day, judged in enumerate(days):
-            own = [[each for each in some if group(each.change) == name] for some in judged]
-            covered = np.array([np.mean([each.covered for each in some]) for some in own])
-            every = [each for some in own for each in some]
-            of_error = np.sqrt(np.mean([(each.change.difference - each.truth) ** 2 for each in every]))
-            of_sd = np.sqrt(np.mean([each.change.sd**2 for each in every]))
+            of_group = [
+                [judged_change for judged_change in some if group(judged_change.change) == name] for some in judged
+            ]
+            covered = np.array([np.mean([judged_change.covered for judged_change in some]) for some in of_group])
+            every = [judged_change for some in of_group for judged_change in some]
+            of_error = np.sqrt(
+                np.mean([(judged_change.change.difference - judged_change.truth) ** 2 for judged_change in every])
+            )
+            of_sd = np.sqrt(np.mean([judged_change.change.sd**2 for judged_change in every]))
             digits = 3 if name.startswith("moment") else 1
             standard_error = covered.std(ddof=1) / np.sqrt(len(covered)) if len(covered) > 1 else np.nan
             row.append(f"{100 * covered.mean():.0f} ± {100 * standard_error:.0f} %")
             row.append(f"{of_error:.{digits}f} / {of_sd:.{digits}f}")
-            changed = sum(each.change.verdict == "changed" for each in every)
+            changed = sum(judged_change.change.verdict == "changed" for judged_change in every)
             if day == 0:
                 row.append(share(changed, len(every)))
         rows.append(row)
@@ -137,26 +141,32 @@ def primary_table(people: Sequence[Person]) -> str:
     """Return the primary outcomes called changed without a change, and with one."""
     rows = []
     for title, day in (("without a change", 1), ("with a change", 2)):
-        own = [each for one in people for each in one.judged(day) if each.change.primary]
-        covered = sum(each.covered for each in own)
-        changed = sum(each.change.verdict == "changed" for each in own)
-        right = sum(_right(each) for each in own)
-        rows.append([title, share(changed, len(own)), share(covered, len(own)), str(right)])
+        primary = [
+            judged_change for walker in people for judged_change in walker.judged(day) if judged_change.change.primary
+        ]
+        covered = sum(judged_change.covered for judged_change in primary)
+        changed = sum(judged_change.change.verdict == "changed" for judged_change in primary)
+        right = sum(_right(judged_change) for judged_change in primary)
+        rows.append([title, share(changed, len(primary)), share(covered, len(primary)), str(right)])
     return table(["primary outcomes", "*changed*", "covered", "*changed*, and in the true direction"], rows)
 
 
-def _right(one: Judged) -> bool:
-    return one.change.verdict == "changed" and one.change.difference * one.truth > 0.0
+def _right(judged: Judged) -> bool:
+    return judged.change.verdict == "changed" and judged.change.difference * judged.truth > 0.0
 
 
 def published_table(people: Sequence[Person]) -> str:
     """Return the deviations of differences between days beside published ones."""
-    own = [each.change for one in people for each in one.judged(1)]
+    published = [judged_change.change for walker in people for judged_change in walker.judged(1)]
 
     def deviation(*wanted: str) -> str:
-        some = [one for one in own if set(wanted) <= {one.quantity, one.joint, one.component, one.event}]
-        of_all = np.sqrt(np.mean([one.sd**2 for one in some]))
-        smallest = np.sqrt(np.mean([one.mdc95**2 for one in some]))
+        some = [
+            change
+            for change in published
+            if set(wanted) <= {change.quantity, change.joint, change.component, change.event}
+        ]
+        of_all = np.sqrt(np.mean([change.sd**2 for change in some]))
+        smallest = np.sqrt(np.mean([change.mdc95**2 for change in some]))
         digits = 2 if "moment" in wanted else 1
         return f"{of_all:.{digits}f} ({smallest:.{digits}f})"
 
@@ -173,9 +183,9 @@ def published_table(people: Sequence[Person]) -> str:
 
 def document(walks: Mapping[str, Rows], people: Sequence[Person]) -> str:
     """Return the text of docs/validation/changes.md."""
-    pairs = {one.title: judged_pairs(one, walks[one.title]) for one in WALKERS}
+    pairs = {walker.title: judged_pairs(walker, walks[walker.title]) for walker in WALKERS}
     instructed = instructed_changes(walks[SUBJECT4])
-    counted = ", ".join(f"{title}: {len(own)}" for title, own in pairs.items())
+    counted = ", ".join(f"{title}: {len(judged_of_walker)}" for title, judged_of_walker in pairs.items())
     return TEXT.format(
         pairs=counted,
         alarms=alarms_table(pairs),
@@ -276,6 +286,6 @@ def main(
     """Run everything and write the page."""
     with tempfile.TemporaryDirectory() as folder:
         work = (keep or Path(folder)).resolve()
-        walks = {one.title: walks_of(one, data_folder(), work) for one in WALKERS}
+        walks = {walker.title: walks_of(walker, data_folder(), work) for walker in WALKERS}
         seeds = [(seed, work) for seed in range(FIRST_SEED, FIRST_SEED + people)]
         write_page("changes", document(walks, in_parallel(person_of, seeds, workers) if seeds else []))

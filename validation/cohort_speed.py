@@ -223,10 +223,10 @@ def main(
         workers = local_size(people).workers
         spread = np.linspace(0, people - 1, sample).round().astype(int).tolist()
         rounds, runs = [single_fits(study, spread[::3], workers)], []
-        for k, (one, count) in enumerate(((few, fewer), (study, people)), start=1):
-            runs.append(cohort(one, one.with_suffix(".out"), count))
+        for k, (study_folder, count) in enumerate(((few, fewer), (study, people)), start=1):
+            runs.append(cohort(study_folder, study_folder.with_suffix(".out"), count))
             rounds.append(single_fits(study, spread[k::3], workers))
-        singles = Singles(*([s for one in rounds for s in getattr(one, name)] for name in ("alone", "at_once")))
+        singles = Singles(*([s for timed in rounds for s in getattr(timed, name)] for name in ("alone", "at_once")))
         text = document(singles, runs, workers)
     print(json.dumps({**asdict(singles), "runs": [asdict(run) for run in runs]}), file=sys.stderr)
     if dry_run:

@@ -81,11 +81,13 @@ def measured(runs: int, before: Path | None = None) -> tuple[dict[str, list[floa
         trees = [None] if before is None else [None, before.resolve(strict=True)]
         lines = commands(results)
         times = [
-            {name: [one for tree in trees for one in spent(line, tree)] for name, line in lines.items()}
+            {name: [seconds for tree in trees for seconds in spent(line, tree)] for name, line in lines.items()}
             for _ in range(runs + 1)
         ][1:]
         size = (results / FITTED[0] / "report.html").stat().st_size
-    return {name: [min(column) for column in zip(*(one[name] for one in times), strict=True)] for name in lines}, size
+    return {
+        name: [min(column) for column in zip(*(seconds[name] for seconds in times), strict=True)] for name in lines
+    }, size
 
 
 def command_section(runs: int, before: Path | None = None) -> str:

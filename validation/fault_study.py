@@ -103,7 +103,7 @@ def run_faults(
         progress: called with the share done.
     """
     sound = run_sound(walks, workers, lambda share: progress(0.1 * share))
-    cases = [(one, mistake.name) for one in sound for mistake in mistakes]
+    cases = [(sound_walk, mistake.name) for sound_walk in sound for mistake in mistakes]
     return sound, in_parallel(_spoilt, cases, workers, lambda share: progress(0.1 + 0.9 * share))
 
 
@@ -139,9 +139,9 @@ def sound_laboratories(folder: Path, count: int) -> dict[str, SubjectFile]:
             plates.turned_about_vertical(float(np.degrees(turn))),
         ):
             measured = change(measured, rng) or measured
-        own = folder / f"{number}"
-        own.mkdir()
-        laboratories[f"laboratory {number}"] = read_subject(write_person(own, measured))
+        laboratory = folder / f"{number}"
+        laboratory.mkdir()
+        laboratories[f"laboratory {number}"] = read_subject(write_person(laboratory, measured))
     return laboratories
 
 
@@ -170,7 +170,7 @@ def _sound(case: tuple[str, SubjectFile]) -> SoundWalk:
 
 def _spoilt(case: tuple[SoundWalk, str]) -> FaultOutcome:
     sound, name = case
-    return outcome_of(sound, next(one for one in MISTAKES if one.name == name))
+    return outcome_of(sound, next(candidate for candidate in MISTAKES if candidate.name == name))
 
 
 def outcome_of(sound: SoundWalk, mistake: Mistake) -> FaultOutcome:
@@ -217,8 +217,8 @@ def judged(
     """Return the outcome by new findings compared with the fault-free files: "identified" where a code of the fault is
     among them, "warned" where only others are; None where nothing is new.
     """
-    new = [one for one in reported(findings) if _is_new(one, reported(sound))]
-    naming = [one for one in new if one.code in mistake.codes]
+    new = [finding for finding in reported(findings) if _is_new(finding, reported(sound))]
+    naming = [finding for finding in new if finding.code in mistake.codes]
     if not new:
         return None
     first = (naming or new)[0]
@@ -226,16 +226,18 @@ def judged(
     return replace(case, outcome=outcome, code=first.code, said=first.message, by=by)
 
 
-def _is_new(one: Finding, before: Sequence[Finding]) -> bool:
+def _is_new(finding: Finding, before: Sequence[Finding]) -> bool:
     """Return whether no earlier finding of its kind is at least as severe and of about the same size."""
-    same = [other for other in before if other.code == one.code and other.where.overlaps(one.where)]
-    return not any(other.severity >= one.severity and not _differ(one.headline, other.headline) for other in same)
+    same = [other for other in before if other.code == finding.code and other.where.overlaps(finding.where)]
+    return not any(
+        other.severity >= finding.severity and not _differ(finding.headline, other.headline) for other in same
+    )
 
 
-def _differ(one: Quantity | None, other: Quantity | None) -> bool:
-    if one is None or other is None or one.sd is None or not isinstance(one.value, float):
+def _differ(quantity: Quantity | None, other: Quantity | None) -> bool:
+    if quantity is None or other is None or quantity.sd is None or not isinstance(quantity.value, float):
         return False
-    return isinstance(other.value, float) and abs(one.value - other.value) > _CHANGED_SD * one.sd
+    return isinstance(other.value, float) and abs(quantity.value - other.value) > _CHANGED_SD * quantity.sd
 
 
 def moments_of(fit: Fit) -> JointMoments:

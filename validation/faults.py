@@ -90,7 +90,7 @@ made in the files of {walks} walks, one at a time, and given to `kinertia check`
 
 def counts(outcomes: Sequence[FaultOutcome]) -> dict[str, int]:
     """Count faults by outcome; impossible ones are left out."""
-    return {kind: sum(one.outcome == kind for one in outcomes) for kind in _OUTCOMES}
+    return {kind: sum(outcome.outcome == kind for outcome in outcomes) for kind in _OUTCOMES}
 
 
 def faults_markdown(
@@ -117,8 +117,10 @@ def code_rows(fault_free: Sequence[SoundWalk], outcomes: Sequence[FaultOutcome])
     """Return a row for each code: how many faults it identifies, for how many it is the first other finding, and in how
     many fault-free walks it is found.
     """
-    named, warned = (Counter(one.code for one in outcomes if one.outcome == kind) for kind in ("identified", "warned"))
-    without = Counter(code for walk in fault_free for code in {one.code for one in reported(walk.findings)})
+    named, warned = (
+        Counter(finding.code for finding in outcomes if finding.outcome == kind) for kind in ("identified", "warned")
+    )
+    without = Counter(code for walk in fault_free for code in {finding.code for finding in reported(walk.findings)})
     codes = sorted({*named, *warned, *without} - {""})
     return [[code, rule(code).name, str(named[code]), str(warned[code]), str(without[code])] for code in codes]
 
@@ -127,8 +129,8 @@ def faults_rows(sound: Sequence[SoundWalk], outcomes: Sequence[FaultOutcome]) ->
     """Return one row per fault, a column per walk; the first row is fault-free, the last one counts those identified
     among those possible.
     """
-    by_case = {(one.walk, one.mistake): one for one in outcomes}
-    mistakes = dict.fromkeys(one.mistake for one in outcomes)
+    by_case = {(outcome.walk, outcome.mistake): outcome for outcome in outcomes}
+    mistakes = dict.fromkeys(outcome.mistake for outcome in outcomes)
     rows = [[name, *(_cell(by_case[walk.name, name]) for walk in sound)] for name in mistakes]
     rows.insert(0, ["none: the walk as it is", *(_codes(walk) for walk in sound)])
     return [*rows, ["identified / possible", *(_named(walk.name, outcomes) for walk in sound)]]
@@ -153,29 +155,34 @@ def faults_sentence(
 
 def _codes(walk: SoundWalk) -> str:
     """Return the codes found in a fault-free walk, the worst first."""
-    return " ".join(dict.fromkeys(one.code for one in reported(walk.findings))) or "none"
+    return " ".join(dict.fromkeys(finding.code for finding in reported(walk.findings))) or "none"
 
 
 def _count(walks: Sequence[SoundWalk], least: Severity) -> int:
     """Count walks with a finding at least as severe; a walk that cannot be fitted is blocked."""
-    return sum(walk.moments is None or any(one.severity >= least for one in reported(walk.findings)) for walk in walks)
+    return sum(
+        walk.moments is None or any(finding.severity >= least for finding in reported(walk.findings)) for walk in walks
+    )
 
 
 def _findings_of_sound(sound: Sequence[SoundWalk]) -> list[str]:
     """List the findings in fault-free walks."""
-    found = ("; ".join(f"{one.code} {one.message}" for one in reported(walk.findings)) or "nothing" for walk in sound)
+    found = (
+        "; ".join(f"{finding.code} {finding.message}" for finding in reported(walk.findings)) or "nothing"
+        for walk in sound
+    )
     return [f"{walk.name}: {sentences}" for walk, sentences in zip(sound, found, strict=True)]
 
 
-def _cell(one: FaultOutcome) -> str:
-    if one.outcome == "not possible":
+def _cell(fault_outcome: FaultOutcome) -> str:
+    if fault_outcome.outcome == "not possible":
         return "–"
-    return one.outcome + ("*" if one.outcome == "identified" and one.by == "fit" else "")
+    return fault_outcome.outcome + ("*" if fault_outcome.outcome == "identified" and fault_outcome.by == "fit" else "")
 
 
 def _named(walk: str, outcomes: Sequence[FaultOutcome]) -> str:
-    own = [one for one in outcomes if one.walk == walk and one.outcome != "not possible"]
-    return f"{sum(one.outcome == 'identified' for one in own)} / {len(own)}"
+    of_walk = [outcome for outcome in outcomes if outcome.walk == walk and outcome.outcome != "not possible"]
+    return f"{sum(outcome.outcome == 'identified' for outcome in of_walk)} / {len(of_walk)}"
 
 
 def faults_summary(
@@ -184,7 +191,7 @@ def faults_summary(
     """Return every finding, and the changes of the joint moments."""
     return {
         "kinertia": VERSION,
-        "sound": {walk.name: [one.to_dict() for one in walk.findings] for walk in (*sound, *laboratories)},
+        "sound": {walk.name: [finding.to_dict() for finding in walk.findings] for walk in (*sound, *laboratories)},
         "outcomes": [
             {key: None if isinstance(value, float) and not np.isfinite(value) else value for key, value in row.items()}
             for row in map(asdict, outcomes)

@@ -52,9 +52,11 @@ class Case:
 
     def against(self, outcome: Outcome) -> str:
         """Describe deviations from the expected outcome; empty where there are none."""
-        found = {one["code"] for one in unexplained(outcome.content)}
+        found = {finding["code"] for finding in unexplained(outcome.content)}
         missing = [codes for codes in self.expected if not found & set(codes.split("|"))]
-        accused = {one["code"] for one in severe(outcome.content) if one["code"][0] != _OF_RESULT} - self._true
+        accused = {
+            finding["code"] for finding in severe(outcome.content) if finding["code"][0] != _OF_RESULT
+        } - self._true
         if _ANYTHING in self.allowed:
             accused = set()
         against = [] if outcome.status in self.status else [f"exit status {outcome.status}"]
@@ -88,7 +90,7 @@ class Outcome:
     @property
     def joint_moments(self) -> str:
         """What it says of joint moments: use, use with care, do not use; refused where there is no estimate."""
-        said = {one["output"]: one["use"] for one in self.content.get("suitability") or []}
+        said = {rating["output"]: rating["use"] for rating in self.content.get("suitability") or []}
         return said.get("joint moments", "refused")
 
     def residuals(self) -> str:
@@ -127,7 +129,7 @@ def cases(data: Path) -> Iterator[Case]:
 def run(case: Case, out: Path) -> Outcome:
     """Return the outcome of the command, or of the second try, with a drafted marker set."""
     outcome = _outcome([*case.arguments, *(["-o", str(out)] if case.arguments[0] == "fit" else [])], 1)
-    if case.draft is None or not {"L101", "L105"} & {one["code"] for one in unexplained(outcome.content)}:
+    if case.draft is None or not {"L101", "L105"} & {finding["code"] for finding in unexplained(outcome.content)}:
         return outcome
     drafted = out.with_suffix(".toml")
     _outcome(["markers", str(case.folder / case.draft), "-o", str(drafted)], 1)
@@ -150,7 +152,7 @@ def document(outcomes: Sequence[tuple[Case, Outcome]]) -> str:
     rows, messages = [], []
     for case, outcome in outcomes:
         against = case.against(outcome)
-        codes = " ".join(dict.fromkeys(one["code"] for one in severe(outcome.content))) or "-"
+        codes = " ".join(dict.fromkeys(finding["code"] for finding in severe(outcome.content))) or "-"
         end = [str(outcome.status), outcome.joint_moments, str(outcome.tries), codes, outcome.residuals()]
         end.append(f"{outcome.seconds:.0f}")
         rows.append([case.title, case.truth, f"no: {against}" if against else "yes", *end])
@@ -172,9 +174,9 @@ def verdicts(outcomes: Sequence[tuple[Case, Outcome]]) -> str:
     said = ("use", "use with care", "do not use", "refused")
     rows = []
     for title, sound in (("nothing known that concerns joint moments", True), ("a fault that concerns them", False)):
-        own = [outcome.joint_moments for case, outcome in outcomes if case.sound is sound]
-        rows.append([title, *(f"{own.count(each)} of {len(own)}" for each in said)])
-    return table(["recordings with", *(f"*{each}*" for each in said)], rows)
+        judged = [outcome.joint_moments for case, outcome in outcomes if case.sound is sound]
+        rows.append([title, *(f"{judged.count(word)} of {len(judged)}" for word in said)])
+    return table(["recordings with", *(f"*{word}*" for word in said)], rows)
 
 
 TEXT = """# Field trials
@@ -208,7 +210,7 @@ def main(
     """Run all recordings and write the page."""
     data, outcomes = (data or data_folder()).resolve(), []
     with tempfile.TemporaryDirectory() as folder:
-        for k, case in enumerate(one for one in cases(data) if part in one.title):
+        for k, case in enumerate(candidate for candidate in cases(data) if part in candidate.title):
             outcome = run(case, Path(folder) / str(k))
             outcomes.append((case, outcome))
             against = case.against(outcome) or "yes"

@@ -109,7 +109,7 @@ def session(case: Case, seed: int) -> Session:
     truth = walk(person, WALK_S, PLATES_HZ)
     fast = walk(person, WALK_S, PLATES_HZ, manner=Manner(FAST_PACE)) if case.fast_walk else None
     squats = squat(person) if case.squats else None
-    others = [one.motion.q for one in (fast, squats) if one is not None]
+    others = [solved.motion.q for solved in (fast, squats) if solved is not None]
     skin = SkinMotion.draw(truth.skeleton, truth.motion.q, rng, others)
 
     def seen(trial: SyntheticTrial, markers: Markers, every: int = 1) -> Markers:
@@ -163,7 +163,7 @@ def _compared(fit: Fit, recorded: Session, seconds: float) -> Measured:
         wrong, sd = trial.joint_loads["estimate"][:, ours] - expected[:, theirs], trial.deviations.moments[:, ours]
         coverage[joint] = float(np.mean(np.abs(wrong) < WITHIN * sd))
         errors[joint], variances[joint] = float(np.square(wrong).mean()), float(np.square(sd).mean())
-    axes = {_tilt(one): one for one in fit.posterior.calibration if one.quantity == AXIS}
+    axes = {_tilt(entry): entry for entry in fit.posterior.calibration if entry.quantity == AXIS}
     knees = [name for name in recorded.tilts_rad if name.startswith("knee")]
     found = np.array([(axes[name].value, axes[name].sd) if name in axes else (0.0, 0.0) for name in knees])
     true = np.array([recorded.tilts_rad[name] for name in knees])
@@ -179,17 +179,20 @@ def row(case: Case, people: Sequence[Measured]) -> list[str]:
     """One line of the table."""
     cells = [case.title]
     for joint in COORDINATES:
-        covered = np.array([one.coverage[joint] for one in people])
+        covered = np.array([person.coverage[joint] for person in people])
         error, sd = (
-            np.sqrt(np.mean([getattr(one, name)[joint] for one in people])) for name in ("errors_nm2", "variances_nm2")
+            np.sqrt(np.mean([getattr(person, name)[joint] for person in people]))
+            for name in ("errors_nm2", "variances_nm2")
         )
         deviation = covered.std() / np.sqrt(len(covered))
         cells.append(f"{100 * covered.mean():.1f} ± {100 * deviation:.1f} % ({error:.2f} / {sd:.2f})")
-    off, sds = (np.concatenate([getattr(one, name) for one in people]) for name in ("axis_errors_rad", "axis_sds_rad"))
-    error, sd = (np.degrees(np.sqrt(np.mean(np.square(each)))) for each in (off, sds))
+    off, sds = (
+        np.concatenate([getattr(person, name) for person in people]) for name in ("axis_errors_rad", "axis_sds_rad")
+    )
+    error, sd = (np.degrees(np.sqrt(np.mean(np.square(values)))) for values in (off, sds))
     within = 100.0 * np.mean(np.abs(off) < WITHIN * sds)
     cells.append(f"{error:.2f} / {sd:.2f} ({within:.0f} %)" if sds.any() else f"{error:.2f}, fixed")
-    return [*cells, f"{np.median([one.seconds for one in people]):.1f}"]
+    return [*cells, f"{np.median([person.seconds for person in people]):.1f}"]
 
 
 def document(rows: Sequence[Sequence[str]], people: int) -> str:

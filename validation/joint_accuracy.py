@@ -121,22 +121,22 @@ def joint_errors(
         motion = Motion(*(spline(time, order) for order in range(3)))
         usual.append(Outcome(before.skeleton, before.literature, motion, measured).moments(time) - expected)
     off = [q - true.q for q in (after.motion.q, ik.q[kinematics.frames])]
-    changes = [each - each.mean(axis=0) for each in off]
+    changes = [change - change.mean(axis=0) for change in off]
     result = {}
     for joint, begins in JOINTS.items():
-        own = [name.startswith(begins) for name in truth.skeleton.coordinates]
+        of_joint = [name.startswith(begins) for name in truth.skeleton.coordinates]
         result[joint] = JointErrors(
-            moment=_square(wrong[:, own]),
-            moment_variance=_square(deviations.moments[:, own]),
-            moment_coverage=_covered(wrong[:, own], deviations.moments[:, own]),
-            power_coverage=_covered(power_wrong[:, own], deviations.powers[:, own]),
-            usual=tuple(_square(each[:, own]) for each in usual),
-            angle=_square(off[0][:, own]),
-            angle_variance=_square(deviations.coordinates[:, own]),
-            angle_coverage=_covered(off[0][:, own], deviations.coordinates[:, own]),
-            angle_ik=_square(off[1][:, own]),
-            change=_square(changes[0][:, own]),
-            change_ik=_square(changes[1][:, own]),
+            moment=_square(wrong[:, of_joint]),
+            moment_variance=_square(deviations.moments[:, of_joint]),
+            moment_coverage=_covered(wrong[:, of_joint], deviations.moments[:, of_joint]),
+            power_coverage=_covered(power_wrong[:, of_joint], deviations.powers[:, of_joint]),
+            usual=tuple(_square(moments[:, of_joint]) for moments in usual),
+            angle=_square(off[0][:, of_joint]),
+            angle_variance=_square(deviations.coordinates[:, of_joint]),
+            angle_coverage=_covered(off[0][:, of_joint], deviations.coordinates[:, of_joint]),
+            angle_ik=_square(off[1][:, of_joint]),
+            change=_square(changes[0][:, of_joint]),
+            change_ik=_square(changes[1][:, of_joint]),
         )
     return result
 
@@ -153,7 +153,7 @@ def joint_accuracy(people: Sequence[JointErrors]) -> JointAccuracy:
     """Summarise one joint over all people."""
 
     def mean(name: str) -> float:
-        return float(np.mean([getattr(one, name) for one in people]))
+        return float(np.mean([getattr(person, name) for person in people]))
 
     def rms(name: str) -> float:
         return float(np.sqrt(mean(name)))
@@ -163,7 +163,7 @@ def joint_accuracy(people: Sequence[JointErrors]) -> JointAccuracy:
         moment_sd_nm=rms("moment_variance"),
         coverage=mean("moment_coverage"),
         power_coverage=mean("power_coverage"),
-        usual_nm=float(np.sqrt(np.mean([one.usual for one in people], axis=0).min())),
+        usual_nm=float(np.sqrt(np.mean([person.usual for person in people], axis=0).min())),
         angle_rad=rms("angle"),
         angle_sd_rad=rms("angle_variance"),
         angle_coverage=mean("angle_coverage"),

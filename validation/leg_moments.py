@@ -40,15 +40,15 @@ class Counted:
 def counted(trial: TrialFit) -> Iterator[Counted]:
     """Count the frames of each leg that meets a plate."""
     k, skeleton = trial.kinematics, trial.skeleton
-    own, time = k.trial, k.trial.markers.time
-    loaded = own.loads.force[nearest_samples(own.loads.time, time), :, 1] >= LOAD_THRESHOLD_N
+    recorded, time = k.trial, k.trial.markers.time
+    loaded = recorded.loads.force[nearest_samples(recorded.loads.time, time), :, 1] >= LOAD_THRESHOLD_N
     (first, last), ends_s = k.spline.time[[0, -1]], 0.5 / k.cutoff_hz
     inner, inside = (time >= first + ends_s) & (time <= last - ends_s), k.inside(time) & k.complete
     for foot, (side, segment) in enumerate(zip(FEET, skeleton.feet, strict=True)):
         frames = np.flatnonzero(loaded[:, foot])
         if len(frames):
             columns = np.unique(skeleton.map.owner[skeleton.support[skeleton.segments.index(segment)]])
-            possible = own.known_legs[:, foot] & np.isfinite(k.ik.q[:, columns]).all(axis=1)
+            possible = recorded.known_legs[:, foot] & np.isfinite(k.ik.q[:, columns]).all(axis=1)
             possible[: frames[0]] = possible[frames[-1] + 1 :] = False
             known = np.zeros(len(time), dtype=bool)
             known[k.trajectory_frames] = _known(trial, side)
@@ -74,11 +74,11 @@ def main() -> None:
             if case.arguments[0] != "fit" or run(case, out).status == 2 or not (out / FIT_FILE).is_file():
                 continue
             for trial in load_fit(out).trials:
-                for one in counted(trial) if trial.kinematics.trial.task in GAIT else ():
-                    counts = [one.possible, one.known, one.inner, one.complete]
+                for count in counted(trial) if trial.kinematics.trial.task in GAIT else ():
+                    counts = [count.possible, count.known, count.inner, count.complete]
                     total += counts
-                    share = f"{100 * one.known / max(one.possible, 1):.1f}"
-                    rows.append([f"{case.title}, {trial.name}", one.side, *map(str, counts), share])
+                    share = f"{100 * count.known / max(count.possible, 1):.1f}"
+                    rows.append([f"{case.title}, {trial.name}", count.side, *map(str, counts), share])
     rows.append(["all", "", *map(str, total), f"{100 * total[1] / total[0]:.1f}"])
     heads = ["walk", "leg", "possible frames", "known", "away from the ends", "all contact measured", "known (%)"]
     print(table(heads, rows))

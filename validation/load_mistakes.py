@@ -307,8 +307,8 @@ def one_plate(change: Callable[[PlateLoads, FloatArray, FloatArray, FloatArray],
     def changed(plates: PlateLoads) -> PlateLoads:
         first = _by_time(plates)[0]
         parts = [part.copy() for part in acting(plates)]
-        own = change(plates, *(part[:, first] for part in parts))
-        for part, new in zip(parts, own, strict=True):
+        changed_parts = change(plates, *(part[:, first] for part in parts))
+        for part, new in zip(parts, changed_parts, strict=True):
             part[:, first] = new
         return loads_of(plates, *parts)
 

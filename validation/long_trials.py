@@ -176,7 +176,7 @@ def main(
     """Measure and write the page."""
     lengths = minutes or MINUTES
     walks = [*((length, RATE_HZ) for length in lengths), (max(lengths), FAST_PLATES_HZ)]
-    write_page("long-trials", document([in_own_process(*one) for one in walks]))
+    write_page("long-trials", document([in_own_process(*arguments) for arguments in walks]))
 
 
 if __name__ == "__main__":

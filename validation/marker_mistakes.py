@@ -30,10 +30,10 @@ def exchanged(*pairs: tuple[str, str], where: str = "both") -> Change:
     def change(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:
         names = person.marker_set.landmarks
         swaps: dict[str, str] = {}
-        for one, other in pairs:
-            if one not in names or other not in names:
+        for label, other in pairs:
+            if label not in names or other not in names:
                 return None
-            for a, b in zip(names[one], names[other], strict=False):
+            for a, b in zip(names[label], names[other], strict=False):
                 swaps |= {a: b, b: a}
         return _in(person, where, lambda markers: _renamed(markers, swaps), set(swaps))
 
@@ -59,13 +59,13 @@ def wands_exchanged(person: MeasuredPerson, rng: np.random.Generator) -> Measure
     joints = {label for name, labels in person.marker_set.landmarks.items() if "wand" not in name for label in labels}
     seen = set(person.walk.markers.labels)
     picked = [
-        [one for one in person.marker_set.segments[name] if one not in joints and one in seen]
+        [segment for segment in person.marker_set.segments[name] if segment not in joints and segment in seen]
         for name in ("thigh_r", "shank_r")
     ]
     if not all(picked):
         return None
-    one, other = (labels[0] for labels in picked)
-    return person.in_walk(lambda markers: _renamed(markers, {one: other, other: one}))
+    wand, other = (labels[0] for labels in picked)
+    return person.in_walk(lambda markers: _renamed(markers, {wand: other, other: wand}))
 
 
 def turned(rotation: FloatArray, where: str = "both") -> Change:
@@ -127,11 +127,11 @@ def copied(source: str, target: str) -> Change:
         labels = [names.get(name, ("",))[0] for name in (source, target)]
         if not set(labels) <= set(person.walk.markers.labels):
             return None
-        one, other = (person.walk.markers.labels.index(label) for label in labels)
+        column, other = (person.walk.markers.labels.index(label) for label in labels)
 
         def same(markers: Markers) -> Markers:
             places = markers.positions.copy()
-            places[:, other] = places[:, one]
+            places[:, other] = places[:, column]
             return replace(markers, positions=places)
 
         return person.in_walk(same)
@@ -204,9 +204,9 @@ def exchanged_for_a_while(person: MeasuredPerson, rng: np.random.Generator) -> M
 
     def changed(markers: Markers) -> Markers:
         places = markers.positions.copy()
-        one, other = (markers.labels.index(name) for name in names)
+        column, other = (markers.labels.index(name) for name in names)
         rows = np.abs(markers.time - middle) <= 0.2
-        places[rows, one], places[rows, other] = places[rows, other], places[rows, one]
+        places[rows, column], places[rows, other] = places[rows, other], places[rows, column]
         return replace(markers, positions=places)
 
     return person.in_walk(changed)
@@ -243,8 +243,8 @@ def few_frames(rate_hz: float) -> Change:
         step = round(person.walk.markers.rate_hz / rate_hz)
         plates, frames = person.plates, len(person.walk.markers.time)
         kept = slice(0, frames // step * step, step)
-        own = slice(0, kept.stop * (len(plates.time) // frames))
-        cut = replace(plates, time=plates.time[own], force=plates.force[own], moment=plates.moment[own])
+        samples = slice(0, kept.stop * (len(plates.time) // frames))
+        cut = replace(plates, time=plates.time[samples], force=plates.force[samples], moment=plates.moment[samples])
         return person.with_plates(cut).in_walk(
             lambda markers: replace(markers, time=markers.time[kept], positions=markers.positions[kept])
         )
@@ -259,7 +259,8 @@ def low_passed(cutoff_hz: float) -> Change:
         def smooth(markers: Markers) -> Markers:
             sections = butter(2, cutoff_hz, fs=markers.rate_hz, output="sos")
             known = np.stack(
-                [bridged_trajectory(markers.time, one) for one in np.moveaxis(markers.positions, 1, 0)], axis=1
+                [bridged_trajectory(markers.time, trajectory) for trajectory in np.moveaxis(markers.positions, 1, 0)],
+                axis=1,
             )
             smoothed = sosfiltfilt(sections, known, axis=0)
             return replace(markers, positions=np.where(np.isfinite(markers.positions), smoothed, np.nan))
@@ -330,9 +331,9 @@ def _twin(label: str, labels: tuple[str, ...]) -> str | None:
     for k, letter in enumerate(label):
         if letter in "RLrl":
             twin = label[:k] + {"R": "L", "L": "R", "r": "l", "l": "r"}[letter] + label[k + 1 :]
-            for one in (twin, label[:k] + {"R": "L", "L": "R", "r": "L", "l": "R"}[letter] + label[k + 1 :]):
-                if one in labels and one != label:
-                    return one
+            for candidate in (twin, label[:k] + {"R": "L", "L": "R", "r": "L", "l": "R"}[letter] + label[k + 1 :]):
+                if candidate in labels and candidate != label:
+                    return candidate
             lower = label[:k] + {"L": "r", "R": "l", "r": "l", "l": "r"}[letter] + label[k + 1 :]
             if lower in labels:
                 return lower

@@ -121,14 +121,14 @@ def on_measured_skin(
         strides = strides_since(markers.time, heel_strikes_s(forces, side), pace_s) + begins
         outward = np.array([1.0, 1.0, 1.0 if side == "r" else -1.0])
         for bone, segment in _SEGMENTS.items():
-            own = [name for name, body in bodies.items() if body == f"{bone}_{side}"]
-            local = np.array([array(known.get(name).get_location()) for name in own])
+            names = [name for name, body in bodies.items() if body == f"{bone}_{side}"]
+            local = np.array([array(known.get(name).get_location()) for name in names])
             from_knee = (local - knees[side] * [0, bone == "femur", 0]) * outward / femur_m
             drawn = from_knee + rng.normal(0.0, PLACE_SD_M, local.shape) / femur_m
             moved = skin.at(strides, skin.curves(segment, drawn)) * outward
             moved += CAMERA_M * rng.standard_normal(moved.shape)
-            columns = [markers.labels.index(name) for name in own]
-            positions[:, columns] = _displaced(person, q, own, moved)
+            columns = [markers.labels.index(name) for name in names]
+            positions[:, columns] = _displaced(person, q, names, moved)
     return replace(markers, positions=positions)
 
 

@@ -28,17 +28,19 @@ def results(name: str, folder: Path, *more: str) -> dict[str, Any]:
 
 def unexplained(run: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return open findings that no other explains, from the output of `--json` or fit.json."""
-    return [one for one in run.get("findings", []) if one["status"] == "open" and one["muted_by"] is None]
+    return [
+        finding for finding in run.get("findings", []) if finding["status"] == "open" and finding["muted_by"] is None
+    ]
 
 
 def severe(run: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the unexplained findings that lower a verdict."""
-    return [one for one in unexplained(run) if one["severity"] in ("WARNING", "ERROR")]
+    return [finding for finding in unexplained(run) if finding["severity"] in ("WARNING", "ERROR")]
 
 
 def messages_of(run: Mapping[str, Any]) -> list[str]:
     """Return code and message of findings that lower a verdict."""
-    return [f"{one['code']} {one['message']}" for one in severe(run)]
+    return [f"{finding['code']} {finding['message']}" for finding in severe(run)]
 
 
 def farthest(bsp: pd.DataFrame) -> str:
@@ -135,7 +137,7 @@ def document(runs: dict[str, dict[str, Any]]) -> str:
         ["walk", *times],
         ([WALKS[name], *(f"{t['seconds'][stage]:.2f}" for stage in times)] for name, t in trials.items()),
     )
-    warnings = "\n".join(f"- {WALKS[name]}: {each}" for name, run in runs.items() for each in messages_of(run))
+    warnings = "\n".join(f"- {WALKS[name]}: {message}" for name, run in runs.items() for message in messages_of(run))
     return _PAGE.format(
         used=used,
         residuals=residuals,

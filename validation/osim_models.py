@@ -80,7 +80,7 @@ def document(runs: dict[tuple[str, bool], dict[str, Any]]) -> str:
         title = f"{PEOPLE[name].title}, {'calibrated' if calibrate else 'as it is'}"
         rows += [_trial_row(title, trial) for trial in run["trials"]]
         bodies.append(_body_row(title, run))
-        warnings += [f"- {title}: {each}" for each in messages_of(run)]
+        warnings += [f"- {title}: {message}" for message in messages_of(run)]
     residuals = table(
         ["model, trial", "frames", "markers, IK (mm)", "markers, estimate (mm)"]
         + [f"{unit}, {stage}" for unit in ("N", "N m") for stage in ("model", *STAGES[1:])],

@@ -167,7 +167,10 @@ def run_populations(
         rows += of_group
         means += of_mean
     carried = zip(*drawn[len(POPULATIONS) * people :], strict=True)
-    rucksacks = [_of_rucksack(gain, each) for gain, each in zip((None, GAIN_SD_PERCENT), carried, strict=True)]
+    rucksacks = [
+        _of_rucksack(gain, carried_people)
+        for gain, carried_people in zip((None, GAIN_SD_PERCENT), carried, strict=True)
+    ]
     return PopulationsStudy(tuple(rows), tuple(means), tuple(rucksacks))
 
 
@@ -181,7 +184,7 @@ def of_population(
         drawn: outcomes of `run_person` for each person.
     """
     population, adults = POPULATIONS[name], literature_prior(walking_subject().literature)
-    with_adults, with_own = (list(each) for each in zip(*drawn, strict=True))
+    with_adults, with_own = (list(people_of_prior) for people_of_prior in zip(*drawn, strict=True))
     right = population.of(adults)
     outcomes = {
         "adults'": with_adults,
@@ -189,10 +192,16 @@ def of_population(
         "learnt from others": _with_learnt_prior(with_adults),
         "exactly known": [_again(person, right) for person in with_adults],
     }
-    rows = [_summarised(population.title, prior, each) for prior, each in outcomes.items() if each]
+    rows = [
+        _summarised(population.title, prior, people_of_prior)
+        for prior, people_of_prior in outcomes.items()
+        if people_of_prior
+    ]
     if len(drawn) < FEWEST_PEOPLE:
         return rows, []
-    return rows, [_of_mean(population.title, learn([known(one.information) for one in with_adults]), adults, right)]
+    return rows, [
+        _of_mean(population.title, learn([known(person.information) for person in with_adults]), adults, right)
+    ]
 
 
 def _of_mean(title: str, learnt: LearntPrior, adults: BspPrior, right: BspPrior) -> MeanAccuracy:
@@ -211,7 +220,7 @@ def _of_mean(title: str, learnt: LearntPrior, adults: BspPrior, right: BspPrior)
 
 
 def _of_rucksack(gain_sd_percent: float | None, people: Sequence[PersonOutcome]) -> RucksackAccuracy:
-    error, sd = (np.array([getattr(one, name)[-1, 0] for one in people]) for name in ("errors", "sd"))
+    error, sd = (np.array([getattr(person, name)[-1, 0] for person in people]) for name in ("errors", "sd"))
     within = float(np.mean(np.abs(error) < WITHIN * sd))
     return RucksackAccuracy(len(people), gain_sd_percent, rms(error), rms(sd), within)
 
@@ -223,11 +232,13 @@ def run_person(seed: int, case: tuple[str, int]) -> tuple[PersonOutcome, ...]:
     subject, rng = walking_subject(), np.random.default_rng(of_person)
     adults = literature_prior(subject.literature)
     if name == RUCKSACK.name:
-        skeleton, own = with_attached_prior(subject.skeleton, adults, [RUCKSACK], MASS_KG)
-        true = own.draw(rng).table()
+        skeleton, with_rucksack = with_attached_prior(subject.skeleton, adults, [RUCKSACK], MASS_KG)
+        true = with_rucksack.draw(rng).table()
         true[-1, 0] = RUCKSACK_KG
-        person = replace(subject, skeleton=skeleton, bsp=BodySegmentParameters.from_table(own.mean.segments, true))
-        cases = [(own, Instruments()), (own, Instruments(gain_sd_percent=GAIN_SD_PERCENT))]
+        person = replace(
+            subject, skeleton=skeleton, bsp=BodySegmentParameters.from_table(with_rucksack.mean.segments, true)
+        )
+        cases = [(with_rucksack, Instruments()), (with_rucksack, Instruments(gain_sd_percent=GAIN_SD_PERCENT))]
     else:
         person = replace(subject, bsp=POPULATIONS[name].of(adults).draw(rng))
         cases = [(prior, Instruments()) for prior in (adults, own_prior(name, adults))]
@@ -249,7 +260,7 @@ def _with_learnt_prior(people: Sequence[PersonOutcome]) -> list[PersonOutcome]:
     parts = [list(people[k::_PARTS]) for k in range(_PARTS)]
     outcomes = []
     for k, part in enumerate(parts):
-        others = [known(one.information) for other in parts[:k] + parts[k + 1 :] for one in other]
+        others = [known(person.information) for other in parts[:k] + parts[k + 1 :] for person in other]
         if len(others) < FEWEST_PEOPLE:
             return []
         group = learn(others).of(prior)
@@ -319,7 +330,7 @@ def _compared(
 
 
 def _summarised(title: str, prior: str, people: Sequence[PersonOutcome]) -> PopulationAccuracy:
-    errors, before, sd = (np.array([getattr(one, name) for one in people]) for name in ("errors", "before", "sd"))
+    errors, before, sd = (np.array([getattr(person, name) for person in people]) for name in ("errors", "before", "sd"))
     return PopulationAccuracy(
         title,
         prior,
@@ -327,7 +338,7 @@ def _summarised(title: str, prior: str, people: Sequence[PersonOutcome]) -> Popu
         {name: rms(errors[..., columns]) for name, columns in COLUMNS.items()},
         {name: rms(before[..., columns]) for name, columns in COLUMNS.items()},
         float(np.mean(np.abs(errors) < WITHIN * sd)),
-        rms(np.array([one.moments_nm for one in people])),
-        rms(np.array([one.moments_before_nm for one in people])),
-        float(np.mean([one.unlike for one in people])),
+        rms(np.array([person.moments_nm for person in people])),
+        rms(np.array([person.moments_before_nm for person in people])),
+        float(np.mean([person.unlike for person in people])),
     )

@@ -30,33 +30,41 @@ _SHOWN = {"mass": (1.0, ".2f"), "CoM": (1e3, ".1f"), "inertia": (1.0, ".3f")}
 def population_rows(accuracies: Sequence[PopulationAccuracy]) -> list[list[str]]:
     """Return one row per population and prior, under `HEADINGS`."""
     rows = []
-    for one in accuracies:
+    for accuracy in accuracies:
         cells = [
-            _both(factor * one.rms[name], factor * one.rms_before[name], form)
+            _both(factor * accuracy.rms[name], factor * accuracy.rms_before[name], form)
             for name, (factor, form) in _SHOWN.items()
         ]
-        cells.append(_both(one.moments_nm, one.moments_before_nm, ".2f"))
-        rows.append([one.title, one.prior, *cells, f"{100 * one.coverage:.1f} %", f"{100 * one.unlike:.0f} %"])
+        cells.append(_both(accuracy.moments_nm, accuracy.moments_before_nm, ".2f"))
+        rows.append(
+            [
+                accuracy.title,
+                accuracy.prior,
+                *cells,
+                f"{100 * accuracy.coverage:.1f} %",
+                f"{100 * accuracy.unlike:.0f} %",
+            ]
+        )
     return rows
 
 
 def mean_sentences(means: Sequence[MeanAccuracy]) -> list[str]:
     """Describe what is learnt of the mean of each population, in a sentence each."""
     return [
-        f"Mean of {one.people} {one.title}: {one.informed} parameters are known to {INFORMED_SD:g} of the literature's "
-        f"deviations or better; of these {100 * one.coverage:.0f} % are within their 95 % intervals (of all "
-        f"{100 * one.coverage_of_all:.0f} %), and the tables' RMS error of {one.rms_before:.2f} deviations becomes "
-        f"{one.rms:.2f}."
-        for one in means
+        f"Mean of {mean.people} {mean.title}: {mean.informed} parameters are known to {INFORMED_SD:g} of "
+        f"the literature's deviations or better; of these {100 * mean.coverage:.0f} % are within their 95 % intervals "
+        f"(of all {100 * mean.coverage_of_all:.0f} %), and the tables' RMS error of {mean.rms_before:.2f} "
+        f"deviations becomes {mean.rms:.2f}."
+        for mean in means
     ]
 
 
 def rucksack_sentence(rucksacks: Sequence[RucksackAccuracy]) -> str:
     """Describe the estimate of a rucksack that was declared with unknown mass."""
     found = [
-        f"{_gain(one)}: RMS error {one.rms_kg:.2f} kg, stated deviation {one.sd_kg:.2f} kg, within the 95 % interval "
-        f"in {100 * one.coverage:.0f} %"
-        for one in rucksacks
+        f"{_gain(rucksack)}: RMS error {rucksack.rms_kg:.2f} kg, stated deviation {rucksack.sd_kg:.2f} kg, within the "
+        f"95 % interval in {100 * rucksack.coverage:.0f} %"
+        for rucksack in rucksacks
     ]
     return (
         f"A rucksack of {RUCKSACK_KG:g} kg, declared with unknown mass, {rucksacks[0].people} people. "

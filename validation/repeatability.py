@@ -70,7 +70,7 @@ class Shared:
     def chi2(self) -> float:
         """Squared deviations from the weighted mean, each over its variance, over the degrees of freedom."""
         mean, _ = weighted_mean(self.estimates)
-        squares = sum(((one.value - mean) / one.sd) ** 2 for one in self.estimates)
+        squares = sum(((estimate.value - mean) / estimate.sd) ** 2 for estimate in self.estimates)
         return squares / (len(self.estimates) - 1)
 
     @property
@@ -90,10 +90,10 @@ class Shared:
         """Yield each trial that accuses an instrument, and whether the other trials contradict it."""
         if self.group not in INSTRUMENT_GROUPS:
             return
-        for one in self.estimates:
-            if one.accuses:
-                mean, sd = weighted_mean([other for other in self.estimates if other is not one])
-                yield one, abs(one.value - mean) > APART * float(np.hypot(one.sd, sd))
+        for estimate in self.estimates:
+            if estimate.accuses:
+                mean, sd = weighted_mean([other for other in self.estimates if other is not estimate])
+                yield estimate, abs(estimate.value - mean) > APART * float(np.hypot(estimate.sd, sd))
 
 
 @dataclass(frozen=True)
@@ -120,8 +120,8 @@ class GroupSums:
 
 def weighted_mean(estimates: Sequence[Estimate]) -> tuple[float, float]:
     """Return the mean, weighted by inverse variances, and its SD."""
-    weights = [one.sd**-2 for one in estimates]
-    mean = sum(weight * one.value for weight, one in zip(weights, estimates, strict=True)) / sum(weights)
+    weights = [estimate.sd**-2 for estimate in estimates]
+    mean = sum(weight * estimate.value for weight, estimate in zip(weights, estimates, strict=True)) / sum(weights)
     return mean, sum(weights) ** -0.5
 
 
@@ -143,32 +143,32 @@ def shared(folders: Sequence[Path], instruments_only: bool = False) -> list[Shar
 def group_sums(unknowns: Iterable[Shared]) -> dict[str, GroupSums]:
     """Summarise each group that has any unknowns."""
     by_group: dict[str, list[Shared]] = {}
-    for one in unknowns:
-        by_group.setdefault(one.group, []).append(one)
+    for unknown in unknowns:
+        by_group.setdefault(unknown.group, []).append(unknown)
     return {group: _sums(by_group[group]) for group in GROUPS if group in by_group}
 
 
 def _sums(unknowns: Sequence[Shared]) -> GroupSums:
-    worst = max(unknowns, key=lambda one: one.chi2)
+    worst = max(unknowns, key=lambda unknown: unknown.chi2)
     return GroupSums(
         unknowns=len(unknowns),
-        mean=statistics.fmean(one.chi2 for one in unknowns),
+        mean=statistics.fmean(unknown.chi2 for unknown in unknowns),
         worst=worst.chi2,
         worst_name=worst.name,
-        beyond=sum(one.beyond for one in unknowns),
-        pairs_apart=statistics.fmean(apart for one in unknowns for apart in one.apart),
-        median_sd=statistics.median_high([estimate.sd for one in unknowns for estimate in one.estimates]),
+        beyond=sum(unknown.beyond for unknown in unknowns),
+        pairs_apart=statistics.fmean(apart for unknown in unknowns for apart in unknown.apart),
+        median_sd=statistics.median_high([estimate.sd for unknown in unknowns for estimate in unknown.estimates]),
     )
 
 
 def _calibrated(folder: Path) -> Iterator[tuple[tuple[str, str, str], Estimate]]:
     for entry in json.loads((folder / "fit.json").read_text(encoding="utf-8"))["calibration"]:
-        one = CalibrationEntry(**entry)
-        if one.sd and (one.trial is None or one.quantity == ZERO):
-            group = one.quantity if one.of_instrument else "joint"
+        error = CalibrationEntry(**entry)
+        if error.sd and (error.trial is None or error.quantity == ZERO):
+            group = error.quantity if error.of_instrument else "joint"
             yield (
-                (str(replace(one, trial=None)), group, one.unit),
-                Estimate(folder.name, one.value, one.sd, one.prior_sd, one.supported),
+                (str(replace(error, trial=None)), group, error.unit),
+                Estimate(folder.name, error.value, error.sd, error.prior_sd, error.supported),
             )
 
 

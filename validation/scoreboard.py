@@ -35,28 +35,28 @@ def cases(folder: Path) -> Iterator[tuple[Case, Path | None]]:
         yield case, None
     data, fits = data_folder(), {"default": (), "calibrated": ("--calibrate",)}
     for name in ("walking1", "walking2"):
-        own, at_home = folder / f"subject4-{name}", data / "subject4"
-        own.mkdir(exist_ok=True)
-        loads = _on_both_feet(at_home / f"{name}_external_forces.xml", own / "loads_declared.xml")
+        case_folder, at_home = folder / f"subject4-{name}", data / "subject4"
+        case_folder.mkdir(exist_ok=True)
+        loads = _on_both_feet(at_home / f"{name}_external_forces.xml", case_folder / "loads_declared.xml")
         motion = at_home / f"addbiomechanics_{name}_ik.mot"
         title, model = f"subject4, {name}", at_home / "addbiomechanics_scaled.osim"
         walk, forces = at_home / f"{name}.trc", at_home / f"{name}_grf.mot"
-        yield Case(title, own, model, walk, forces, loads, 62.6, fits), motion if motion.exists() else None
-    own, at_home = folder / "hamner", data / "field" / "hamner_run"
-    own.mkdir(exist_ok=True)
+        yield Case(title, case_folder, model, walk, forces, loads, 62.6, fits), motion if motion.exists() else None
+    case_folder, at_home = folder / "hamner", data / "field" / "hamner_run"
+    case_folder.mkdir(exist_ok=True)
     model, walk = at_home / "subject02_registered.osim", at_home / "subject02_running.trc"
     forces, loads, setup = (
         at_home / name for name in ("subject02_running_grf.mot", "External_Loads.xml", "Setup_IK.xml")
     )
-    yield Case("Hamner, run at 4 m/s", own, model, walk, forces, loads, 65.9, fits, setup), None
+    yield Case("Hamner, run at 4 m/s", case_folder, model, walk, forces, loads, 65.9, fits, setup), None
 
 
 def _on_both_feet(loads: Path, out: Path) -> Path:
     """Copy the loads of subject4, whose file has both plates under the right foot, with the second under the left."""
     tree = ET.parse(loads)
     for force, body in zip(tree.iter("ExternalForce"), ("calcn_r", "calcn_l"), strict=True):
-        for one in force.iter("applied_to_body"):
-            one.text = body
+        for element in force.iter("applied_to_body"):
+            element.text = body
     tree.write(out)
     return out
 
@@ -82,7 +82,7 @@ def peak_force_n(case: Case, time: np.ndarray) -> float:
 def rows(case: Case, runs: Runs) -> list[list[str]]:
     """Return the table's rows of one recording."""
     cells, largest = [], peak_force_n(case, runs["time"])
-    for program in (one for one in ORDER if one in runs):
+    for program in (program_name for program_name in ORDER if program_name in runs):
         result, row = runs[program], [case.title, PROGRAMS_HERE[program]]
         if result.failed or result.opensim is None:
             cells.append([*row, "failed", *[""] * 6])
@@ -114,10 +114,12 @@ def parsed(text: str) -> list[pd.DataFrame]:
 
 def hidden() -> list[list[str]]:
     """Return rows of what residuals cannot show: question, figure, page."""
-    held = next(one for one in tables_of("held-out") if "force (N)" in one)
+    held = next(candidate for candidate in tables_of("held-out") if "force (N)" in candidate)
     pairs = held["force (N)"].str.split(" -> ", expand=True).astype(float)
     before, after = (float(np.sqrt((pairs[k] ** 2).mean())) for k in (0, 1))
-    sessions = pd.concat([one for one in tables_of("sessions") if "chi2/n, mean" in one])
+    sessions = pd.concat(
+        [sessions_table for sessions_table in tables_of("sessions") if "chi2/n, mean" in sessions_table]
+    )
     count = sessions["unknowns"].astype(float)
     agreed = float((sessions["chi2/n, mean"].astype(float) * count).sum() / count.sum())
     apart = float((sessions["beyond 99 %"].astype(float)).sum() / count.sum())
@@ -152,8 +154,8 @@ def document(runs: Sequence[tuple[Case, Runs]]) -> str:
     """Return the text of docs/validation/scoreboard.md."""
     heads = ["recording", "program", "markers (cm)", "force (N)", "a component (N)", "force (% of peak load)"]
     heads += ["moment (N m)", "a component (N m)", "largest force (% of peak load)"]
-    shown = [row for case, one in runs for row in rows(case, one)]
-    failed = [f"{case.title}: {one['rra'].failed}" for case, one in runs if one["rra"].failed]
+    shown = [row for case, programs in runs for row in rows(case, programs)]
+    failed = [f"{case.title}: {programs['rra'].failed}" for case, programs in runs if programs["rra"].failed]
     return TEXT.format(
         results=table(heads, shown),
         failed=f"RRA gave no result on {'; '.join(failed)}." if failed else "RRA failed on none.",
@@ -206,9 +208,9 @@ def main(
         folder.mkdir(parents=True, exist_ok=True)
         runs = []
         for case, motion in cases(folder):
-            one = results(case)
+            result = results(case)
             if motion is not None:
-                one[THEIRS] = delivered_by_addbiomechanics(case, motion, one["time"])
-            runs.append((case, one))
-            print("\n".join(" | ".join(row) for row in rows(case, one)), flush=True)
+                result[THEIRS] = delivered_by_addbiomechanics(case, motion, result["time"])
+            runs.append((case, result))
+            print("\n".join(" | ".join(row) for row in rows(case, result)), flush=True)
         write_page("scoreboard", document(runs))

@@ -132,18 +132,20 @@ def section(session: Session, data: Path, keep: Path) -> str:
     people = [
         [fitted(session, person, trial, data, keep) for trial in trials] for person, trials in session.people.items()
     ]
-    folders = [[one.folder for one in trials if not one.said] for trials in people]
+    folders = [[trial.folder for trial in trials if not trial.said] for trials in people]
     parts = [f"## {session.title}"]
     if len(people) > 1:
         parts += [
             "### Each person's trials against each other",
-            compared([one for own in folders for one in shared(own)]),
+            compared([shared_value for folder in folders for shared_value in shared(folder)]),
         ]
-        together = shared([folder for own in folders for folder in own], instruments_only=True)
+        together = shared(
+            [folder for folders_of_person in folders for folder in folders_of_person], instruments_only=True
+        )
         parts += ["### The instruments, all people", compared(together)]
     else:
         parts.append(compared(shared(folders[0])))
-    refused = [f"- {one.trial}: {one.said}" for trials in people for one in trials if one.said]
+    refused = [f"- {trial.trial}: {trial.said}" for trials in people for trial in trials if trial.said]
     if refused:
         parts += ["Without results:", "\n".join(refused)]
     return "\n\n".join(parts)
@@ -151,17 +153,17 @@ def section(session: Session, data: Path, keep: Path) -> str:
 
 def compared(unknowns: Sequence[Shared]) -> str:
     """Return the table of the groups, and the warnings about instruments."""
-    units = {one.group: one.unit for one in unknowns}
+    units = {unknown.group: unknown.unit for unknown in unknowns}
     rows = []
     for group, sums in group_sums(unknowns).items():
         row = [group, str(sums.unknowns), f"{sums.mean:.2f}", f"{sums.worst:.2f} ({sums.worst_name})"]
         row += [str(sums.beyond), f"{100 * sums.pairs_apart:.0f} %", _deviation(sums.median_sd, units[group])]
         rows.append(row)
     heads = ["group", "unknowns", "chi2/n, mean", "worst", "beyond 99 %", "pairs apart", "median sd"]
-    accused = [(one, estimate, wrong) for one in unknowns for estimate, wrong in one.accusations()]
+    accused = [(unknown, estimate, wrong) for unknown in unknowns for estimate, wrong in unknown.accusations()]
     contradicted = [
-        f"- {estimate.trial}: {one.name}: {_deviation(estimate.value, one.unit)}"
-        for one, estimate, wrong in accused
+        f"- {estimate.trial}: {shared_value.name}: {_deviation(estimate.value, shared_value.unit)}"
+        for shared_value, estimate, wrong in accused
         if wrong
     ]
     said = f"Values that are beyond 1.96 of their prior and of their own deviation: {len(accused)}; "
@@ -203,7 +205,7 @@ def main(
     """Write the page, or print the part about one session."""
     with tempfile.TemporaryDirectory() as temporary:
         kept = (keep or Path(temporary)).resolve()
-        parts = [section(one, data_folder(), kept) for one in SESSIONS if only in (None, one.name)]
+        parts = [section(chosen, data_folder(), kept) for chosen in SESSIONS if only in (None, chosen.name)]
     if only:
         print("\n\n".join(parts))
     else:

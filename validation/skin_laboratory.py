@@ -131,7 +131,7 @@ def _compared(folder: Path, usual: Mapping[int, pd.DataFrame]) -> Walk:
     return Walk(
         {name: at(found, name) - at(true, name) for name in names},
         {name: at(sd, name) for name in names},
-        {hz: {name: at(each, name) - at(true, name) for name in names} for hz, each in usual.items()},
+        {hz: {name: at(outputs, name) - at(true, name) for name in names} for hz, outputs in usual.items()},
         {name: down(name) for name in names},
         _instruments(calibration),
     )
@@ -145,23 +145,23 @@ def joint_of(column: str) -> str | None:
 def _instruments(calibration: Sequence[Mapping[str, object]]) -> dict[str, float]:
     """Return the displacement of the left plate along the walk (mm), and the delay of the forces (ms)."""
     result = {}
-    for one in calibration:
-        value = 1e3 * float(str(one["value"]))
-        if one["quantity"] == "position" and one["axis"] == "x" and str(one["plate"]).startswith("left"):
+    for entry in calibration:
+        value = 1e3 * float(str(entry["value"]))
+        if entry["quantity"] == "position" and entry["axis"] == "x" and str(entry["plate"]).startswith("left"):
             result["plate"] = value
-        if one["quantity"] == "delay" and one["trial"] is None:
+        if entry["quantity"] == "delay" and entry["trial"] is None:
             result["delay"] = value
     return result
 
 
-def _pooled(walks: Sequence[Walk], joint: str, of: str, where: str | None = None) -> np.ndarray:
+def _pooled(walks: Sequence[Walk], joint: str, kind: str, where: str | None = None) -> np.ndarray:
     """Return values of all columns of a joint in all walks."""
     values = []
     for walk in walks:
-        each = getattr(walk, of) if of in ("errors", "sd") else walk.usual[int(of)]
-        for name in each:
+        part = getattr(walk, kind) if kind in ("errors", "sd") else walk.usual[int(kind)]
+        for name in part:
             if joint_of(name) == joint:
-                values.append(each[name][walk.loading[name]] if where else each[name])
+                values.append(part[name][walk.loading[name]] if where else part[name])
     return np.concatenate(values)
 
 
@@ -171,11 +171,11 @@ def _rms(values: np.ndarray) -> float:
 
 def joint_row(walks: Sequence[Walk], joint: str) -> list[str]:
     """Return errors, bars and coverage of one joint."""
-    errors, sd = (_pooled(walks, joint, of) for of in ("errors", "sd"))
+    errors, sd = (_pooled(walks, joint, kind) for kind in ("errors", "sd"))
     best = min(_rms(_pooled(walks, joint, str(hz))) for hz in CUTOFFS_HZ)
     cells = [f"{value:.2f}" for value in (_rms(errors), best, _rms(errors) / best, _rms(sd))]
     cells.append(_covered(errors, sd))
-    early, early_sd = (_pooled(walks, joint, of, "loading") for of in ("errors", "sd"))
+    early, early_sd = (_pooled(walks, joint, kind, "loading") for kind in ("errors", "sd"))
     return [JOINTS[joint], *cells, *([f"{_rms(early):.2f}", _covered(early, early_sd)] if len(early) else ["", ""])]
 
 
@@ -264,9 +264,9 @@ def measure(skin: Path, people: int, keep: Path | None = None, workers: int = 2)
         walks = {}
         for kind in INSTRUMENTS:
             folders = [work / f"{kind}{FIRST_SEED + k}" for k in range(people)]
-            one = partial(_one, skin, kind)
+            measure_one = partial(_one, skin, kind)
             with ThreadPoolExecutor(workers) as pool:
-                list(pool.map(one, folders))
+                list(pool.map(measure_one, folders))
             walks[kind] = [made(f, skin, kind, int(f.name.removeprefix(kind))) for f in folders]
         write_page("measured-skin", document(walks), "accuracy --skin FILE")
 

@@ -89,20 +89,20 @@ def there_and_back(values: np.ndarray, times: int) -> np.ndarray:
     return np.concatenate([part if k == 0 else part[1:] for k, part in enumerate(parts)])
 
 
-def lengthened(one: Walk, window_s: tuple[float, float], times: int, folder: Path) -> Walk:
+def lengthened(walked: Walk, window_s: tuple[float, float], times: int, folder: Path) -> Walk:
     """Write the walk's window repeated back and forth, as files."""
     folder.mkdir(exist_ok=True)
-    markers = read_trc(one.markers).cut(*window_s)
+    markers = read_trc(walked.markers).cut(*window_s)
     positions = there_and_back(markers.positions, times)
     clock = markers.time[0] + np.arange(len(positions)) / markers.rate_hz
     write_trc(folder / "walk.trc", Markers(clock, markers.labels, positions))
-    table = read_sto(one.forces)
+    table = read_sto(walked.forces)
     table = table[(table.index >= window_s[0]) & (table.index <= window_s[1])]
     forces = there_and_back(table.to_numpy(), times)
     step = (table.index[-1] - table.index[0]) / (len(table) - 1)
     index = pd.Index(table.index[0] + np.arange(len(forces)) * step, name="time")
     write_sto(folder / "walk.mot", pd.DataFrame(forces, index, table.columns), False, "walk")
-    return Walk(folder / "walk.trc", folder / "walk.mot", one.loads, one.static, one.mass_kg, one.subject)
+    return Walk(folder / "walk.trc", folder / "walk.mot", walked.loads, walked.static, walked.mass_kg, walked.subject)
 
 
 def best(runs: int, work: Callable[[], Any]) -> tuple[float, Any]:
@@ -115,16 +115,16 @@ def best(runs: int, work: Callable[[], Any]) -> tuple[float, Any]:
     return min(times), result
 
 
-def ours(one: Walk, runs: int) -> tuple[dict[str, float], int]:
+def ours(walked: Walk, runs: int) -> tuple[dict[str, float], int]:
     """Return Kinertia's seconds per stage, and the number of frames."""
     seconds = {}
-    seconds["read"], recording = best(runs, lambda: read_recording(one.markers, one.forces, one.loads))
-    static = read_recording(one.static)
+    seconds["read"], recording = best(runs, lambda: read_recording(walked.markers, walked.forces, walked.loads))
+    static = read_recording(walked.static)
     marker_set = choose_marker_set(static.markers.labels)
     feet = foot_labels(marker_set, recording.markers)
     span = (float(recording.markers.time[0]), float(recording.markers.time[-1]))
     trial = build_trial(recording, feet, span)
-    model = _model(static, marker_set, one.subject)
+    model = _model(static, marker_set, walked.subject)
     seconds["calibration"], calibrated = best(min(runs, 2), lambda: calibrate(model, [trial]))
     skeleton = calibrated.skeleton
     seconds["inverse kinematics"], ik = best(runs, lambda: solve_ik(skeleton, trial.markers))
@@ -132,7 +132,9 @@ def ours(one: Walk, runs: int) -> tuple[dict[str, float], int]:
     motion = Motion(*(spline(ik.time, order) for order in range(3)))
     columns = trial.loads.wrench.reshape(-1, 12)
     loads = smooth(trial.loads.time, columns, 10.0)(ik.time).reshape(-1, 2, 6)
-    bsp = literature_bsp(one.mass_kg, known(one.subject.height_m), known(one.subject.sex), model.geometry, "dumas")
+    bsp = literature_bsp(
+        walked.mass_kg, known(walked.subject.height_m), known(walked.subject.sex), model.geometry, "dumas"
+    )
     parts = intervals(Window(ik.time, motion, loads.sum(axis=1)))
     vector = ParameterVector(bsp, symmetric=True)
     problem, theta = TwoLevelProblem(skeleton, vector, parts, True, 0.5), vector.values(bsp)
@@ -172,15 +174,15 @@ def foot_labels(marker_set: MarkerSet, markers: Markers) -> dict[str, list[str]]
 
 def both_ik(name: str, runs: int) -> tuple[float, float]:
     """Return seconds per frame of `solve_ik` and of OpenSim, run alternately so that both meet the same load."""
-    one = walk(name)
-    recording, static = read_recording(one.markers, one.forces, one.loads), read_recording(one.static)
+    walked = walk(name)
+    recording, static = read_recording(walked.markers, walked.forces, walked.loads), read_recording(walked.static)
     marker_set = choose_marker_set(static.markers.labels)
     feet = foot_labels(marker_set, recording.markers)
-    skeleton = calibrate(_model(static, marker_set, one.subject), [build_trial(recording, feet)]).skeleton
+    skeleton = calibrate(_model(static, marker_set, walked.subject), [build_trial(recording, feet)]).skeleton
     mine, theirs = [], []
     for _ in range(runs):
         theirs.append(opensim_ik(name))
-        mine.append(best(5, lambda: solve_ik(skeleton, read_trc(one.markers)))[0])
+        mine.append(best(5, lambda: solve_ik(skeleton, read_trc(walked.markers)))[0])
     frames = len(recording.markers.time)
     return min(mine) / frames, min(theirs) / frames
 

@@ -126,9 +126,9 @@ def _errors(walk: Path, seed: int, laboratory: Laboratory, truth: pd.DataFrame) 
         curves = trial.joint_curves
         assert curves is not None
         assert curves.moment_sd is not None
-        own = curves.joints["estimate"]
-        names, index = list(own.names), pd.Index(curves.time, name="time")
-        values = pd.DataFrame(own.moments.reshape(len(index), -1), index, names)
+        loads = curves.joints["estimate"]
+        names, index = list(loads.names), pd.Index(curves.time, name="time")
+        values = pd.DataFrame(loads.moments.reshape(len(index), -1), index, names)
         sd = pd.DataFrame(curves.moment_sd.reshape(len(index), -1), index, names)
         usual = _usual_moments(walk / "walk.trc", model, mass_kg, forces, curves.time, folder)
     measured = np.isin(np.round(curves.time, 6), np.round(trial.time, 6))
@@ -184,15 +184,15 @@ def steps_on_plates(forces: pd.DataFrame, steps: int | None) -> pd.DataFrame:
     if steps is None:
         return forces
     contacts = {side: _whole_contacts(forces, side) for side in SIDES}
-    pairs = [(one, next((two for two in contacts["l"] if two[0] > one[0]), None)) for one in contacts["r"]]
-    right, left = next((one, two) for one, two in pairs if two is not None)
+    pairs = [(contact, next((two for two in contacts["l"] if two[0] > contact[0]), None)) for contact in contacts["r"]]
+    right, left = next((first, two) for first, two in pairs if two is not None)
     result = forces
     for side, kept in zip(SIDES, (right, left if steps > 1 else None), strict=True):
         rows = np.ones(len(forces), dtype=bool)
         if kept is not None:
             rows[kept[0] : kept[1]] = False
-        own = forces.columns.str.contains(f"_{side}_")
-        result = result.mask(rows[:, None] & own, 0.0)
+        of_side = forces.columns.str.contains(f"_{side}_")
+        result = result.mask(rows[:, None] & of_side, 0.0)
     return result
 
 

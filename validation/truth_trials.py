@@ -176,10 +176,10 @@ def plate_row(wrench: np.ndarray, share: dict[str, float], points: dict[str, np.
     for side in SIDES:
         if share[side] == 0:
             continue
-        own, turning = share[side] * force, share[side] * rest
-        shift = np.array([turning[2], 0, -turning[0]]) / own[1] if abs(own[1]) > 1 else np.zeros(3)
-        free = turning - np.cross(shift, own)
-        for axis, f, p in zip("xyz", own, below[side] + shift, strict=True):
+        part, turning = share[side] * force, share[side] * rest
+        shift = np.array([turning[2], 0, -turning[0]]) / part[1] if abs(part[1]) > 1 else np.zeros(3)
+        free = turning - np.cross(shift, part)
+        for axis, f, p in zip("xyz", part, below[side] + shift, strict=True):
             row[f"ground_force_{side}_v{axis}"], row[f"ground_force_{side}_p{axis}"] = f, p
         row[f"ground_torque_{side}_y"] = free[1]
     return row
@@ -248,18 +248,18 @@ def markers_on_skin(person: Person, motion: Spline, names: Sequence[str], rng: n
 
 def write_loads(path: Path, forces: str) -> None:
     """Write the ExternalLoads file for a forces file of `force_columns`."""
-    one = """<ExternalForce name="{name}"><applied_to_body>calcn_{side}</applied_to_body>
+    template = """<ExternalForce name="{name}"><applied_to_body>calcn_{side}</applied_to_body>
       <force_expressed_in_body>ground</force_expressed_in_body><point_expressed_in_body>ground</point_expressed_in_body>
       <force_identifier>ground_force_{side}_v</force_identifier>
       <point_identifier>ground_force_{side}_p</point_identifier>
       <torque_identifier>ground_torque_{side}_</torque_identifier></ExternalForce>"""
-    each = "\n      ".join(one.format(name=name, side=name[0]) for name in ("right", "left"))
+    both_forces = "\n      ".join(template.format(name=name, side=name[0]) for name in ("right", "left"))
     path.write_text(
         f"""<?xml version="1.0" encoding="UTF-8"?>
 <OpenSimDocument Version="40000">
   <ExternalLoads name="loads">
     <objects>
-      {each}
+      {both_forces}
     </objects>
     <datafile>{forces}</datafile>
   </ExternalLoads>
@@ -299,8 +299,8 @@ def make_trial(folder: Path, seed: int, faults: Faults, source: Source, skin: Me
     rng = np.random.default_rng(seed)
     with quietly(folder / "opensim.log"):
         model = opensim.Model(str(source.model))
-        for things in (model.updForceSet(), model.updControllerSet()):
-            things.clearAndDestroy()
+        for actuators in (model.updForceSet(), model.updControllerSet()):
+            actuators.clearAndDestroy()
         model.finalizeConnections()
         model.initSystem()
         inverse_kinematics(model, source.markers, folder / "truth" / "ik.mot", span_s=source.span_s)

@@ -45,7 +45,7 @@ def read_people(folder: Path) -> tuple[FloatArray, FloatArray]:
             if colon:
                 found[key.strip()] = float(value)
         unit_m = found["measurementconversionfactor"]
-        people.append([unit_m * np.mean([found[key] for key in one.keys]) for one in measures()])
+        people.append([unit_m * np.mean([found[key] for key in measure.keys]) for measure in measures()])
         weighed_kg = found.get("totalmass", -1.0)
         masses.append(weighed_kg if weighed_kg > 0.0 else np.nan)
     return np.array(people), np.array(masses)
@@ -53,7 +53,7 @@ def read_people(folder: Path) -> tuple[FloatArray, FloatArray]:
 
 def stature_m(measures_m: FloatArray) -> FloatArray:
     """Return statures (people,) from measures (people, 58)."""
-    names = [one.name for one in measures()]
+    names = [measure.name for measure in measures()]
     total: FloatArray = measures_m[:, [names.index(name) for name in PARTS_OF_STATURE]].sum(axis=1)
     return total / (1.0 - ANKLE_HEIGHT)
 
@@ -69,7 +69,7 @@ def fitted(measures_m: FloatArray, mass_kg: FloatArray) -> UsualBuild:
     A few people show little of a spread: it is combined with the median of its kind, which counts as four people more.
     """
     values = measures_m.copy()
-    mass = np.where(np.isnan(mass_kg), [stadium_mass_kg(one) for one in values], mass_kg)
+    mass = np.where(np.isnan(mass_kg), [stadium_mass_kg(value) for value in values], mass_kg)
     low, high = GIRTH_OVER_WIDTH
     for girth, width in girths_with_widths():  # errors in writing
         ratio = values[:, girth] / values[:, width]
@@ -79,7 +79,7 @@ def fitted(measures_m: FloatArray, mass_kg: FloatArray) -> UsualBuild:
     off = relative - shape
     count = np.sum(~np.isnan(off), axis=0)
     own_variance = np.nansum(np.square(off), axis=0)
-    kinds = np.array([one.kind for one in measures()])
+    kinds = np.array([measure.kind for measure in measures()])
     pooled = np.zeros(len(kinds))
     for kind in set(kinds):
         which = kinds == kind
@@ -95,7 +95,10 @@ def written(usual: UsualBuild) -> str:
     """Return the text of the file."""
     columns = {"median_cm": 100.0 * usual.median_m, "log_shape": usual.log_shape, "log_sd": usual.log_sd}
     columns |= {f"common_{k}": values for k, values in enumerate(usual.common.T, start=1)}
-    rows = [[one.name, *(f"{float(values[k]):.9g}" for values in columns.values())] for k, one in enumerate(measures())]
+    rows = [
+        [measure.name, *(f"{float(values[k]):.9g}" for values in columns.values())]
+        for k, measure in enumerate(measures())
+    ]
     return HEADER + "".join(",".join(row) + "\n" for row in [["name", *columns], *rows])
 
 

@@ -30,10 +30,15 @@ def curves(recording: str, fit: Fit) -> Iterator[pd.DataFrame]:
         fit: the fit.
     """
     for trial in fit.trials:
-        for one in moment_differences(fit, trial):
-            values = {name: getattr(one, name) for name in ("inside", "vicon", "ours", "sd")}
-            values |= {name: one.others[own] for name, own in _OTHERS.items()}
-            key = {"trial": one.trial, "joint": one.joint.lower(), "side": one.side, "component": one.component}
+        for moment_difference in moment_differences(fit, trial):
+            values = {name: getattr(moment_difference, name) for name in ("inside", "vicon", "ours", "sd")}
+            values |= {name: moment_difference.others[kind] for name, kind in _OTHERS.items()}
+            key = {
+                "trial": moment_difference.trial,
+                "joint": moment_difference.joint.lower(),
+                "side": moment_difference.side,
+                "component": moment_difference.component,
+            }
             yield pd.DataFrame(values).assign(recording=recording, **key)
 
 

@@ -66,10 +66,10 @@ def fitted(arguments: list[str], out: Path) -> Fit:
 def rows(title: str, fit: Fit) -> Iterator[tuple[list[str], float]]:
     """Yield the rows of a person, each with the difference of the peaks, N m/kg."""
     for trial in fit.trials:
-        for one in compared_outputs(fit, trial):
-            both = np.isfinite(one.theirs) & np.isfinite(one.ours)
-            if one.kind == "MOMENTS" and both.sum() >= _FEWEST and _has_peak(one.theirs, both):
-                yield _row(title, fit, one, both)
+        for compared_output in compared_outputs(fit, trial):
+            both = np.isfinite(compared_output.theirs) & np.isfinite(compared_output.ours)
+            if compared_output.kind == "MOMENTS" and both.sum() >= _FEWEST and _has_peak(compared_output.theirs, both):
+                yield _row(title, fit, compared_output, both)
 
 
 def _has_peak(theirs: np.ndarray, both: np.ndarray) -> bool:
@@ -79,13 +79,19 @@ def _has_peak(theirs: np.ndarray, both: np.ndarray) -> bool:
     return bool(theirs[at] >= _LEAST_NM_KG and len(around) == 2 * _BESIDE + 1 and around.all())
 
 
-def _row(title: str, fit: Fit, one: OutputComparison, both: np.ndarray) -> tuple[list[str], float]:
-    ours, theirs = one.ours[both], one.theirs[both]
-    bar = INTERVAL_SD * one.sd[both][int(np.argmax(ours))]
+def _row(title: str, fit: Fit, output_comparison: OutputComparison, both: np.ndarray) -> tuple[list[str], float]:
+    ours, theirs = output_comparison.ours[both], output_comparison.theirs[both]
+    bar = INTERVAL_SD * output_comparison.sd[both][int(np.argmax(ours))]
     off = float(ours.max() - theirs.max())
     numbers = [f"{theirs.max():.2f}", f"{ours.max():.2f} ± {bar:.2f}", f"{off:+.2f}"]
-    leg = {"r": "right", "l": "left"}[one.side]
-    return [title, one.trial, f"{leg} {one.joint.lower()}", *numbers, corrections(fit) or "-"], off
+    leg = {"r": "right", "l": "left"}[output_comparison.side]
+    return [
+        title,
+        output_comparison.trial,
+        f"{leg} {output_comparison.joint.lower()}",
+        *numbers,
+        corrections(fit) or "-",
+    ], off
 
 
 def stance_table(stance: pd.DataFrame) -> str:
@@ -94,9 +100,9 @@ def stance_table(stance: pd.DataFrame) -> str:
     rows = []
     for joint in ("hip", "knee", "ankle"):
         for component in COMPONENTS:
-            own = stance[(stance["joint"] == joint) & (stance["component"] == component)]
+            of_component = stance[(stance["joint"] == joint) & (stance["component"] == component)]
             for inside, name in ((True, "all on plates"), (False, "not all")):
-                some = own[own["inside"] == inside]
+                some = of_component[of_component["inside"] == inside]
                 if len(some):
                     rows.append([f"{joint} {component}", name, *_agreement_cells(some)])
     return table(heads, rows)
@@ -113,11 +119,11 @@ def correlations_table(stance: pd.DataFrame) -> str:
     """Return the correlation of each component in every recording."""
     names = [f"{joint} {component}" for joint in ("hip", "knee", "ankle") for component in COMPONENTS]
     rows = []
-    for recording, own in stance.groupby("recording", sort=False):
+    for recording, of_recording in stance.groupby("recording", sort=False):
         cells = []
         for name in names:
             joint, component = name.split()
-            some = own[(own["joint"] == joint) & (own["component"] == component)]
+            some = of_recording[(of_recording["joint"] == joint) & (of_recording["component"] == component)]
             cells.append(f"{agreement(some)['correlation']:.2f}" if len(some) else "-")
         rows.append([str(recording), *cells])
     return table(["correlation", *names], rows)
@@ -127,8 +133,11 @@ def centres_table(apart: list[tuple[str, np.ndarray]]) -> str:
     """Return how far joint centres are from Vicon's, mean and RMS over legs, mm."""
     rows = []
     for joint in ("hip", "knee", "ankle"):
-        own = 1e3 * np.array([value for name, value in apart if name == joint])
-        cells = [f"{mean:+.0f} ({rms:.0f})" for mean, rms in zip(own.mean(0), np.sqrt((own**2).mean(0)), strict=True)]
+        of_joint = 1e3 * np.array([value for name, value in apart if name == joint])
+        cells = [
+            f"{mean:+.0f} ({rms:.0f})"
+            for mean, rms in zip(of_joint.mean(0), np.sqrt((of_joint**2).mean(0)), strict=True)
+        ]
         rows.append([joint, *cells])
     return table(["mm", "forward", "up", "outward"], rows)
 

@@ -130,7 +130,7 @@ def _place(piece: str, text: str, start: int, strict: bool) -> tuple[int, int] |
         return start, start
     for k in range(len(words) - len(wanted) + 1):
         here = words[k : k + len(wanted)]
-        if all(_alike(one, other[0], strict) for one, other in zip(wanted, here, strict=True)):
+        if all(_alike(wanted_word, other[0], strict) for wanted_word, other in zip(wanted, here, strict=True)):
             return here[0].start(), here[-1].end()
     return None
 
@@ -141,7 +141,7 @@ def _alike(shown: str, real: str, strict: bool) -> bool:
     if _NUMBER.sub("#", shown) != _NUMBER.sub("#", real):
         return False
     pairs = zip(_NUMBER.findall(shown), _NUMBER.findall(real), strict=True)
-    return not strict or all(_near(one, other) for one, other in pairs)
+    return not strict or all(_near(wanted_word, other) for wanted_word, other in pairs)
 
 
 def _near(shown: str, real: str) -> bool:

@@ -184,8 +184,8 @@ def _opensim_moments(data: Path, work: Path) -> pd.DataFrame:
 
 def _verdict_strip(figure: plt.Figure, fitted: dict) -> None:
     """What the fit says of its joint moments, and its finding about the left plate, below the curves."""
-    use = next(one["use"] for one in fitted["suitability"] if one["output"] == "joint moments")
-    message = next(one["message"] for one in fitted["findings"] if one["code"] == "P267")
+    use = next(rating["use"] for rating in fitted["suitability"] if rating["output"] == "joint moments")
+    message = next(finding["message"] for finding in fitted["findings"] if finding["code"] == "P267")
     fill, edge = _USE_COLORS[use]
     strip = figure.add_axes((0.015, 0.03, 0.97, 0.125))
     strip.set(xlim=(0, 1), ylim=(0, 1), xticks=[], yticks=[], facecolor=fill)

@@ -86,33 +86,33 @@ def _family(family: str) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def _rule(one: Rule) -> Iterator[str]:
-    yield f"### {one.code} {one.name} {{ #{one.code.lower()} }}"
-    severity = f"**{one.severity}**" + (f"; {one.escalation}" if one.escalation else "")
-    yield f"{severity} · {one.stage} stage · {_overruling(one)}"
-    yield f"> {outlined(one.message, '*{}*')}"
-    yield f"**Detects.** {one.detects}"
-    yield f"**Effect.** {outlined(one.effect, '*{}*')}"
-    if one.causes:
-        yield "**Likely causes.**\n\n" + "\n".join(f"{k}. {cause}" for k, cause in enumerate(one.causes, 1))
-    yield f"**Remedy.** {outlined(one.remedy, '*{}*')}"
-    if one.affects:
-        yield f"**Affects** {', '.join(one.affects).replace('_', ' ')}."
-    if one.supersedes:
-        yield f"**Explains** {_links(one.supersedes)}."
-    if one.resolves:
-        yield f"**Resolves** {_links(one.resolves)}."
+def _rule(rule: Rule) -> Iterator[str]:
+    yield f"### {rule.code} {rule.name} {{ #{rule.code.lower()} }}"
+    severity = f"**{rule.severity}**" + (f"; {rule.escalation}" if rule.escalation else "")
+    yield f"{severity} · {rule.stage} stage · {_overruling(rule)}"
+    yield f"> {outlined(rule.message, '*{}*')}"
+    yield f"**Detects.** {rule.detects}"
+    yield f"**Effect.** {outlined(rule.effect, '*{}*')}"
+    if rule.causes:
+        yield "**Likely causes.**\n\n" + "\n".join(f"{k}. {cause}" for k, cause in enumerate(rule.causes, 1))
+    yield f"**Remedy.** {outlined(rule.remedy, '*{}*')}"
+    if rule.affects:
+        yield f"**Affects** {', '.join(rule.affects).replace('_', ' ')}."
+    if rule.supersedes:
+        yield f"**Explains** {_links(rule.supersedes)}."
+    if rule.resolves:
+        yield f"**Resolves** {_links(rule.resolves)}."
 
 
-def _overruling(one: Rule) -> str:
+def _overruling(rule: Rule) -> str:
     """Whether it may be overruled; how is on the index."""
-    words = [] if one.severity == "ERROR" else ["can be ignored"]
-    if one.severity == "ERROR" or "ERROR" in one.escalation:
+    words = [] if rule.severity == "ERROR" else ["can be ignored"]
+    if rule.severity == "ERROR" or "ERROR" in rule.escalation:
         words.append(
             "cannot be waived"
-            if one.hard
+            if rule.hard
             else "can be waived where the file could be read"
-            if one.by_readers
+            if rule.by_readers
             else "can be waived"
         )
     return f"[{', '.join(words)}](../findings.md#overruling)"

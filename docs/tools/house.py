@@ -21,7 +21,7 @@ def layers() -> list[list[str]]:
     contracts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"][
         "contracts"
     ]
-    (contract,) = [one for one in contracts if one["type"] == "layers"]
+    (contract,) = [candidate for candidate in contracts if candidate["type"] == "layers"]
     return [floor.split(" | ") for floor in contract["layers"]]
 
 

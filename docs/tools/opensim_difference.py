@@ -72,5 +72,5 @@ def rows(case: Case) -> list[str]:
 
 if __name__ == "__main__":
     with TemporaryDirectory() as folder:
-        for one in measured_cases(Path(folder)).values():
-            print(*rows(one), sep="\n")
+        for measured_case in measured_cases(Path(folder)).values():
+            print(*rows(measured_case), sep="\n")

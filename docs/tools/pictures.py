@@ -49,7 +49,7 @@ def main() -> None:
     with TemporaryDirectory() as made:
         link_measured("pig_c3d", Path(made))
         subject = Path(made) / "subject.toml"
-        subject.write_text(next(one.text for one in blocks(tutorial) if one.file), encoding="utf-8")
+        subject.write_text(next(block.text for block in blocks(tutorial) if block.file), encoding="utf-8")
         for command in ("check", "fit"):
             subprocess.run(["kinertia", command, subject, "-o", Path(made) / command, "--quiet"], check=True)
         with sync_playwright() as engine:

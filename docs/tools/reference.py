@@ -51,10 +51,10 @@ def _command(name: str, command: Any) -> str:
     parts = [f"## {name} {{ #{name.replace(' ', '-')} }}", *paragraphs]
     if examples.strip():
         parts.append("```text\n" + "\n".join(examples.split("\n\n")).strip() + "\n```")
-    rows = [_parameter(one) for one in command.params if not set(one.opts) & set(_SHARED)]
+    rows = [_parameter(param) for param in command.params if not set(param.opts) & set(_SHARED)]
     if rows:
         parts.append("\n".join(["| | | default |", "|---|---|---|", *rows]))
-    shared = [f"`{name}`" for name in _SHARED[1:] if any(name in one.opts for one in command.params)]
+    shared = [f"`{name}`" for name in _SHARED[1:] if any(name in param.opts for param in command.params)]
     if shared:
         parts.append(f"Also {', '.join(shared)}: [everywhere the same](#everywhere-the-same).")
     return "\n\n".join(parts)

@@ -82,7 +82,11 @@ def directions(view: View) -> dict[str, dict[str, str]]:
             found["angle"][convention] = signed_angles(convention)[view.angle][0]
         if view.moment:
             found["moment"][convention] = signed_joint_moment(view.moment, no_model, convention)[0]
-    return {what: {one: _direction(title) for one, title in own.items()} for what, own in found.items() if own}
+    return {
+        what: {quantity: _direction(title) for quantity, title in titles.items()}
+        for what, titles in found.items()
+        if titles
+    }
 
 
 def _direction(title: str) -> str:

@@ -42,19 +42,19 @@ def test_it_shows_its_address_and_ends_in_order(tmp_path):
     pytest.importorskip("uvicorn")
     command = [*PROGRAM, "app", "--folder", str(tmp_path / "library"), "--no-browser"]
     unbuffered = {**os.environ, "PYTHONUNBUFFERED": "1"}
-    it = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=unbuffered)
+    app = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=unbuffered)
     ask = urllib.request.build_opener(urllib.request.ProxyHandler({})).open
     try:
-        address = re.search(r"http://127\.0\.0\.1:\d+/\S+/", it.stdout.readline())[0]
+        address = re.search(r"http://127\.0\.0\.1:\d+/\S+/", app.stdout.readline())[0]
         assert ask(address, timeout=30).status == 200
         with pytest.raises(urllib.error.HTTPError, match="403"):
             ask(address.rsplit("/", 2)[0] + "/", timeout=30)
-        it.send_signal(signal.SIGINT)
-        rest, _ = it.communicate(timeout=30)
+        app.send_signal(signal.SIGINT)
+        rest, _ = app.communicate(timeout=30)
     finally:
-        it.kill()
-        it.wait()
-    assert it.returncode == 0
+        app.kill()
+        app.wait()
+    assert app.returncode == 0
     assert "stopped" in rest
     assert (tmp_path / "library").is_dir()
 

@@ -63,8 +63,8 @@ forces = "elsewhere/walk.mot"
         ended = run(command, subject)
         assert (ended.status, ended.err.count("error: "), ended.err.count(" F101 ")) == (2, 3, 3)
         found = json.loads(run(command, subject, "--json").out)["findings"]
-        assert [one["code"] for one in found] == ["F101"] * 3
-        lines = [one["where"]["line"] for one in found]
+        assert [finding["code"] for finding in found] == ["F101"] * 3
+        lines = [finding["where"]["line"] for finding in found]
         assert lines == sorted(lines)
 
 
@@ -210,7 +210,7 @@ def test_marker_missing_for_the_whole_trial(lab):
     options = [word for name, value in files.items() for word in (f"--{name}", value)]
     outcome = run("fit", lab / "walk.trc", *options, "-o", lab / "out", "--json")
     assert outcome.status in (0, 1), outcome.err
-    (found,) = [one for one in json.loads(outcome.out)["findings"] if one["code"] == "M101"]
+    (found,) = [finding for finding in json.loads(outcome.out)["findings"] if finding["code"] == "M101"]
     assert (found["severity"], found["where"]) == ("INFO", {"trial": "walk", "markers": ["R.Heel"]})
 
 

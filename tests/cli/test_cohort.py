@@ -61,8 +61,8 @@ def test_a_dry_run_says_who_how_much_and_what_is_missing(lacking, c3d_lab, tmp_p
     assert "very roughly 1 min" in printed
     assert not (tmp_path / "out").exists()
     planned = json.loads(run("cohort", lacking, "-o", tmp_path / "out", "--dry-run", "--json").out)["people"]
-    assert [(one["person"], one["state"], one["trials"]) for one in planned][2] == ("Clara", "due", 1)
-    assert [one["state"] for one in planned] == ["lacking", "lacking", "due", "lacking"]
+    assert [(person["person"], person["state"], person["trials"]) for person in planned][2] == ("Clara", "due", 1)
+    assert [person["state"] for person in planned] == ["lacking", "lacking", "due", "lacking"]
     assert "no subject file" in planned[0]["why"]
     assert "has no forces; name the force file" in planned[3]["why"]
 
@@ -80,7 +80,10 @@ def test_who_cannot_be_fitted_is_in_the_list_of_people(lacking, tmp_path):
     again = run("cohort", lacking, "-o", out, "--json")
     assert again.status == 1
     ended = json.loads(again.out)["people"]
-    assert [(one["person"], one["status"], one["fitted"]) for one in ended] == [("Anna", 2, False), ("Ben", 2, False)]
+    assert [(person["person"], person["status"], person["fitted"]) for person in ended] == [
+        ("Anna", 2, False),
+        ("Ben", 2, False),
+    ]
     assert hashes(out) == before
 
 
@@ -152,10 +155,10 @@ def test_a_cohort_whose_workers_are_killed_is_finished_and_a_rerun_fits_nobody(s
     assert set(people.status[["Anna", "Ben"]]) <= {0, 1}
     bsp = pd.read_parquet(out / "cohort.parquet")
     for name in ("Anna", "Ben"):
-        own = pd.read_csv(out / "people" / name / "bsp.csv")
+        alone = pd.read_csv(out / "people" / name / "bsp.csv")
         rows = bsp[bsp.person == name]
         for column in ("literature", "estimate", "sd", "information"):
-            np.testing.assert_array_equal(rows[column], own[column])
+            np.testing.assert_array_equal(rows[column], alone[column])
     assert not (out / "people" / "Clara").exists()
     (tmp_path / "calm").mkdir()
     save_fit(fit_subject(study / "Anna" / "subject.toml"), tmp_path / "calm", None)

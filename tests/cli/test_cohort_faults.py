@@ -79,7 +79,7 @@ def test_a_person_whose_files_hang_the_reader_is_given_up_and_the_others_are_fit
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PYTHONPATH", with_tests()["PYTHONPATH"])
         ended = list(fit_here(jobs, LocalSize(1, 2 * 1024**3), [sys.executable, "-m", "cohort_faults"]))
-    records = {one.record.person: one.record for one in ended}
+    records = {ending.record.person: ending.record for ending in ended}
     assert records["Anna"].fitted
     lost = records[HANGING]
     assert (lost.status, lost.inputs) == (70, "")

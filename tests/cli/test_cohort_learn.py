@@ -56,7 +56,7 @@ def quick(fit):
         mock.patch("kinertia.cohort.worker.fit_subject", fitted),
         mock.patch("kinertia.cohort.worker.save_fit", saved),
         mock.patch("kinertia.cli.cohort.fit_here", in_this_process),
-        mock.patch("kinertia.cohort.learning.in_parallel", lambda task, cases, *_: [task(one) for one in cases]),
+        mock.patch("kinertia.cohort.learning.in_parallel", lambda task, cases, *_: [task(case) for case in cases]),
     ):
         yield asked
 
@@ -87,7 +87,7 @@ def test_everybody_is_fitted_again_with_what_the_others_teach(study, quick, tmp_
     assert sessions["A"] == sessions["B"] != sessions["D"]
     assert sessions["F"] is None
     ready = prepare_subject(read_subject(out / "learnt" / "subjects" / "A.toml"))
-    sources = [str(one.evidence["source"].value) for one in ready.findings if one.code == "S408"]
+    sources = [str(finding.evidence["source"].value) for finding in ready.findings if finding.code == "S408"]
     assert any("learnt from 5 people" in source for source in sources)
     assert any("known from 2 people (B, C)" in source for source in sources)
 

@@ -145,11 +145,11 @@ def test_check_says_what_it_shows_and_fails_as_without(c3d_lab, tmp_path):
     assert content["recordings"][0]["name"] == "walk"
     assert (content["verdict"], content["rules_run"] > 100) == (["use"], True)
     content = told("check", c3d_lab / "walk.c3d", "--mass", 90, status=1)
-    (found,) = [one for one in content["findings"] if one["severity"] == "ERROR"]
+    (found,) = [reported for reported in content["findings"] if reported["severity"] == "ERROR"]
     assert (found["code"], found["status"], found["evidence"]["stated_kg"]["value"]) == ("S111", "open", 90)
     (tmp_path / "broken.c3d").write_bytes(b"no motion" * 100)
     content = told("check", tmp_path / "broken.c3d", status=2)
-    assert [one["code"] for one in content["findings"]] == ["F103"]
+    assert [finding["code"] for finding in content["findings"]] == ["F103"]
 
 
 def test_demo_sets_the_estimate_beside_the_truth(demo_run, tmp_path, monkeypatch):
@@ -185,7 +185,7 @@ def test_instruments_says_what_its_file_holds(measured_demo, c3d_lab, tmp_path, 
     content = told("instruments", c3d_lab / "subject.toml", "-o", tmp_path / "instruments.toml")
     (person,) = read_session(Path(content["file"]))
     assert content["people"] == [person.name]
-    gain = next(one for one in content["found"] if one["quantity"] == "gain")
+    gain = next(entry for entry in content["found"] if entry["quantity"] == "gain")
     written = (tmp_path / "instruments.toml").read_text(encoding="utf-8")
     assert f"gain_percent = {100 * gain['value']:.3f}"[:-2] in written
 

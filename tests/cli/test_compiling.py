@@ -35,7 +35,9 @@ def test_every_function_is_in_one_share(count):
     functions = compiling.stored_functions()
     shares = compiling.shares(functions, count)
     assert len(shares) == count
-    assert sorted(one.__name__ for share in shares for one in share) == sorted(one.__name__ for one in functions)
+    assert sorted(function.__name__ for share in shares for function in share) == sorted(
+        function.__name__ for function in functions
+    )
     # what two functions call is compiled once where both are in one share
     assert sum(compiling._length(*share) for share in shares) >= compiling._length(*functions)
     if count == 2:

@@ -63,7 +63,9 @@ def test_demo_from_end_to_end(tmp_path, width, monkeypatch):
     check_outcome(outcome, folder)
     assert sum(-(-len(line) // int(width)) or 1 for line in outcome.out.splitlines()) <= 30
     result = json.loads((folder / "fit.json").read_text())
-    found = {one["code"]: one["evidence"] for one in result["findings"] if one["severity"] == "CORRECTED"}
+    found = {
+        finding["code"]: finding["evidence"] for finding in result["findings"] if finding["severity"] == "CORRECTED"
+    }
     assert found["P223"]["gain_error"]["value"] == pytest.approx(demo_module.LABORATORY.gain, abs=0.012)
     assert found["T214"]["delay_s"]["value"] == pytest.approx(demo_module.LABORATORY.delay_s, abs=0.0035)
     assert result["verdict"] == "use"

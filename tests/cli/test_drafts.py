@@ -79,11 +79,11 @@ def test_a_preset_whose_landmarks_a_static_trial_lacks_is_said_to_lack_them(tmp_
 
 def test_a_draft_is_a_marker_set_and_says_what_it_lacks(tmp_path):
     positions = {label: at for label, at in standing_positions().items() if label != "R.Heel"}
-    file, own = written(tmp_path / "static.trc", positions), tmp_path / "own.toml"
-    outcome = run("markers", file, "-o", own)
+    file, draft = written(tmp_path / "static.trc", positions), tmp_path / "own.toml"
+    outcome = run("markers", file, "-o", draft)
     assert "not found, and needed: heel_r" in outcome.out
-    assert read_marker_set(own).landmarks["heel_l"] == ("L.Heel",)
-    assert run("markers", file, "-o", own).status == 2, "what is there is left alone"
+    assert read_marker_set(draft).landmarks["heel_l"] == ("L.Heel",)
+    assert run("markers", file, "-o", draft).status == 2, "what is there is left alone"
     content = json.loads(run("markers", file, "-o", tmp_path / "other.toml", "--json").out)
     assert (content["needed"], content["notes"]) == (["heel_r"], [])
 
@@ -101,7 +101,7 @@ def test_init_writes_what_options_state_and_asks_nothing_without_a_terminal(tmp_
     wanted = read_subject(folder / "subject.toml")
     stated = wanted.subject
     assert (stated.sex, stated.age_years, stated.mass_kg) == ("female", 9.5, 31.0)
-    assert {one.name: one.condition for one in wanted.trials} == {"walk1": "", "walk2": "with orthosis"}
+    assert {trial.name: trial.condition for trial in wanted.trials} == {"walk1": "", "walk2": "with orthosis"}
 
 
 @pytest.mark.parametrize("given", ["walk2", "=x", "walk3=barefoot"])
@@ -119,4 +119,4 @@ def test_init_asks_in_a_terminal_for_what_is_not_known(tmp_path, c3d_lab, monkey
     assert run("init", folder, "--mass", "72.6", "--height", "1.8").status == 0
     wanted = read_subject(folder / "subject.toml")
     assert (wanted.subject.sex, wanted.subject.age_years, wanted.subject.mass_kg) == ("male", 52.0, 72.6)
-    assert {one.name: one.condition for one in wanted.trials} == {"walk1": "", "walk2": "barefoot"}
+    assert {trial.name: trial.condition for trial in wanted.trials} == {"walk1": "", "walk2": "barefoot"}

@@ -86,21 +86,30 @@ def told(*arguments):
 @pytest.mark.parametrize("code", ["P213", "p213", " P213 "])
 def test_a_code_is_explained_in_full(code):
     text = told(code)
-    one = with_limits(rule("P213"))
-    for part in (one.code, one.name, one.severity, one.escalation, one.detects, one.effect, *one.causes, one.remedy):
+    explained_rule = with_limits(rule("P213"))
+    for part in (
+        explained_rule.code,
+        explained_rule.name,
+        explained_rule.severity,
+        explained_rule.escalation,
+        explained_rule.detects,
+        explained_rule.effect,
+        *explained_rule.causes,
+        explained_rule.remedy,
+    ):
         assert part in text
     assert "The zero of <plate> is off: it reads <level>" in text
     assert "{" not in text
     assert "docs/findings/force-plates.md#p213" in text
-    assert all(explained in text for explained in one.supersedes)
+    assert all(explained in text for explained in explained_rule.supersedes)
 
 
 @pytest.mark.parametrize("code", ["P21", "p21", "P"])
 def test_a_question_or_family_lists_its_codes(code):
     text = told(code)
     assert "P21 Are the plates' zeros right?" in text
-    for one in matching(code.upper()):
-        assert f"{one} {rule(one).severity.lower()} {rule(one).name}" in text
+    for known in matching(code.upper()):
+        assert f"{known} {rule(known).severity.lower()} {rule(known).name}" in text
 
 
 @pytest.mark.parametrize(
@@ -129,11 +138,11 @@ def test_it_says_that_what_a_reader_raises_cannot_be_waived():
 @pytest.mark.parametrize(("code", "expected"), [("P213", ("P213",)), ("P21", matching("P21")), ("P", matching("P"))])
 def test_scripts_get_the_rules(code, expected):
     content = json.loads(run("explain", code, "--json").out)
-    assert tuple(one["code"] for one in content) == expected
-    one = content[0]
-    assert one["message"] == rule(one["code"]).message
-    assert one["supersedes"] == list(rule(one["code"]).supersedes)
-    assert one["page"].endswith(f"#{one['code'].lower()}")
+    assert tuple(reported["code"] for reported in content) == expected
+    reported = content[0]
+    assert reported["message"] == rule(reported["code"]).message
+    assert reported["supersedes"] == list(rule(reported["code"]).supersedes)
+    assert reported["page"].endswith(f"#{reported['code'].lower()}")
 
 
 @pytest.mark.parametrize(("code", "near"), [("P2131", "P213"), ("plate-zero-ofset", "P213 (plate-zero-offset)")])

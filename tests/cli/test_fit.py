@@ -30,9 +30,9 @@ def test_several_people_are_fitted_each_into_a_folder_of_their_own(subjects, tmp
     assert outcome.status in (0, 1), outcome.err
     anna, ben = json.loads(outcome.out)
     assert [anna["folder"], ben["folder"]] == [str(out / "anna"), str(out / "ben")]
-    for name, one in (("anna", anna), ("ben", ben)):
+    for name, summary in (("anna", anna), ("ben", ben)):
         written = json.loads((out / name / "fit.json").read_text())
-        assert {key: value for key, value in one.items() if key not in ("folder", "bsp")} == written
+        assert {key: value for key, value in summary.items() if key not in ("folder", "bsp")} == written
         assert f"{subjects / name}.toml -o {out / name}" in (out / name / "report.html").read_text()
     only = json.loads(run("fit", subjects / "anna.toml", "-o", tmp_path / "one", "--json").out)
     assert only["folder"] == str(tmp_path / "one")
@@ -72,11 +72,11 @@ def test_every_finding_that_blocks_one_of_several_people_is_a_line(subjects, tmp
     outcome = run("fit", anna, subjects / "ben.toml", "-o", tmp_path / "out", "--json")
     assert outcome.status == 2
     lines = [line for line in outcome.err.splitlines() if line.startswith("error: ")]
-    assert [line.startswith(f"error: {anna}: {one.line()}") for line, one in zip(lines, found, strict=True)] == [
-        True
-    ] * 2
+    assert [
+        line.startswith(f"error: {anna}: {reported.line()}") for line, reported in zip(lines, found, strict=True)
+    ] == [True] * 2
     blocked, ben = json.loads(outcome.out)
-    assert ([one["code"] for one in blocked["findings"]], blocked["folder"]) == (["P271", "P271"], None)
+    assert ([reported["code"] for reported in blocked["findings"]], blocked["folder"]) == (["P271", "P271"], None)
     assert ben["folder"] == str(tmp_path / "out" / "ben")
 
 

@@ -21,7 +21,9 @@ def test_final_print_is_verdict_three_findings_and_where_the_results_are(fit_of)
     fit = fit_of("synthetic")
     first, *found, last = fit.outcome.out.splitlines()
     severities = [
-        one["severity"] for one in fit.summary["findings"] if (one["status"], one["muted_by"]) == ("open", None)
+        reported["severity"]
+        for reported in fit.summary["findings"]
+        if (reported["status"], reported["muted_by"]) == ("open", None)
     ]
     assert first.startswith(f"{fit.summary['verdict'].capitalize()}. ")
     assert first.endswith("the trial was used.")
@@ -35,16 +37,16 @@ MASSES = {"stated": "measured", "literature": "literature", "estimate": "estimat
 
 
 def test_tables_are_short_readable_and_say_what_was_used(fit, two_level):
-    for one in (fit, two_level):
+    for result in (fit, two_level):
         with common.out.capture() as captured:
-            report_tables(one)
+            report_tables(result)
         lines = captured.get().splitlines()
         assert max(len(line) for line in lines if not line.startswith("assumed: ")) <= 80
         assert len(lines) < 90
         text = " ".join(captured.get().split())
-        told = summary(one)
+        told = summary(result)
         (trial,), mass = told["trials"], told["total_mass_kg"]
-        assert f"72.6 kg, 1.803 m, male; method {one.settings.method}; marker set: Cleveland Clinic" in text
+        assert f"72.6 kg, 1.803 m, male; method {result.settings.method}; marker set: Cleveland Clinic" in text
         assert f"{trial['n_dynamic_frames']} of {trial['n_frames']} frames" in text
         for unit, kind in (("N", "force"), ("Nm", "moment")):
             rms, top = trial[f"residual_{kind}_rms_{unit}"], trial[f"residual_{kind}_max_{unit}"]
@@ -90,7 +92,7 @@ def fit_at_once(monkeypatch, short_fit, person):
         return run("fit", person / "walk.c3d", "--static", person / "static.c3d", "--sex", "male", *options)
 
     fit.runs = done
-    sound = [one for one in short_fit.findings if one.severity is not Severity.ERROR]
+    sound = [reported for reported in short_fit.findings if reported.severity is not Severity.ERROR]
     fit.findings = (*sound, NOT_CONVERGED)
     return fit
 
@@ -102,7 +104,7 @@ def test_an_error_of_the_result_is_status_1_and_the_results_are_there(fit_at_onc
     assert "\nERROR  R201 " in outcome.out
     told = json.loads((tmp_path / "out" / "fit.json").read_text())
     assert (told["converged"], told["verdict"]) == (False, "do not use")
-    assert [one["code"] for one in told["findings"] if one["severity"] == "ERROR"] == ["R201"]
+    assert [reported["code"] for reported in told["findings"] if reported["severity"] == "ERROR"] == ["R201"]
     assert "INFO  " not in outcome.out
     loud = fit_at_once("-o", tmp_path / "out", "--verbose")
     assert "assumed: marker set: Plug-in Gait" in loud.out

@@ -25,7 +25,7 @@ def test_help_has_no_other_markup_than_bold():
 
     def helps(command):
         yield command.help or ""
-        yield from (getattr(one, "help", None) or "" for one in command.params)
+        yield from (getattr(param, "help", None) or "" for param in command.params)
         for child in getattr(command, "commands", {}).values():
             yield from helps(child)
 

@@ -68,12 +68,12 @@ def test_a_group_is_learnt_and_used(cohort, demo_command, tmp_path):
         encoding="utf-8",
     )
     plain, grouped = (prepare_subject(path) for path in (subject, with_group))
-    sources = [str(one.evidence["source"].value) for one in grouped.findings if one.code == "S408"]
+    sources = [str(finding.evidence["source"].value) for finding in grouped.findings if finding.code == "S408"]
     assert any("learnt from 5 people" in source for source in sources)
     assert np.all(grouped.prior.sd <= 1.01 * np.sqrt(1.5) * plain.prior.sd)
     assert grouped.prior.sd.min() > 0
-    own = recordings(read_subject(subject))[0]
-    with_own = (tmp_path / "population.toml").read_text(encoding="utf-8").replace("hash2", own)
+    used_files = recordings(read_subject(subject))[0]
+    with_own = (tmp_path / "population.toml").read_text(encoding="utf-8").replace("hash2", used_files)
     (tmp_path / "population.toml").write_text(with_own, encoding="utf-8")
     refused = run("fit", with_group, "-o", tmp_path / "fit")
     assert refused.status == 2
@@ -259,9 +259,9 @@ def test_the_command_writes_what_it_shows(session):
 @pytest.mark.slow
 def test_a_fit_leaves_out_what_it_has_said_itself(session, c3d_lab, tmp_path):
     path, _ = session
-    own = prepare_subject(subject_with(tmp_path, c3d_lab, f'session = "{path.as_posix()}"'))
-    assert own.uncertainty.instruments.session == ()
-    (said,) = [one for one in own.findings if one.code == "S408"]
+    prepared = prepare_subject(subject_with(tmp_path, c3d_lab, f'session = "{path.as_posix()}"'))
+    assert prepared.uncertainty.instruments.session == ()
+    (said,) = [finding for finding in prepared.findings if finding.code == "S408"]
     assert "1 person (synthetic walker) left out" in said.evidence["source"].value
     (person,) = read_session(path)
     text = path.read_text(encoding="utf-8")

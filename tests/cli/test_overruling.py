@@ -49,7 +49,7 @@ def told(*arguments, status):
 
 
 def statuses(content, code):
-    return [one["status"] for one in content["findings"] if one["code"] == code]
+    return [finding["status"] for finding in content["findings"] if finding["code"] == code]
 
 
 def with_reversed_forces(lab):
@@ -77,7 +77,7 @@ def waived(lab, few_evaluations):
 def test_a_waived_error_is_fitted_and_shown_as_waived_everywhere(waived):
     assert waived.outcome.status in (0, 1), waived.outcome.err
     assert statuses(waived.content, "S111") == ["waived"]
-    assert "S111" not in [one["code"] for one in blocking(waived.content["findings"])]
+    assert "S111" not in [finding["code"] for finding in blocking(waived.content["findings"])]
     assert waived.content["verdict"] != "use"
     first = waived.outcome.out.splitlines()[0]
     assert re.search(r"ne error was waived; the trial was used", first)
@@ -201,8 +201,8 @@ def test_a_blocked_trial_is_left_out_and_the_other_fitted(lab):
     assert re.search(r"1 of 2 trials was used", outcome.out.splitlines()[0])
     content = json.loads((lab / "out" / "fit.json").read_text(encoding="utf-8"))
     assert content["trials_left_out"] == ["reversed"]
-    assert [one["name"] for one in content["trials"]] == ["walk"]
-    (found,) = [one for one in content["findings"] if one["code"] == "P232"]
+    assert [trial["name"] for trial in content["trials"]] == ["walk"]
+    (found,) = [finding for finding in content["findings"] if finding["code"] == "P232"]
     assert (found["where"]["trial"], found["severity"], found["status"]) == ("reversed", "ERROR", "open")
     assert "reversed" in Elements((lab / "out" / "report.html").read_text(encoding="utf-8")).text
 
@@ -220,7 +220,7 @@ def test_where_all_trials_are_blocked_every_error_is_a_line_and_json_has_them(la
     outcome = run("fit", subject_file(lab, two), "-o", lab / "out", "--json")
     assert outcome.status == 2
     content = json.loads(outcome.out)
-    assert [one["where"]["trial"] for one in blocking(content["findings"])] == ["reversed", "again"]
+    assert [finding["where"]["trial"] for finding in blocking(content["findings"])] == ["reversed", "again"]
     errors = [line for line in outcome.err.splitlines() if line.startswith("error: ")]
     assert [line.split("  ")[0] for line in errors] == ["error: reversed", "error: again"]
     assert content["error"].count("P232") == 2

@@ -39,7 +39,7 @@ def test_a_letter_is_written_on_request_and_belongs_to_the_results(results):
     assert outcome.status == 0, outcome.err
     told = json.loads(outcome.out)
     assert [told[name] for name in ("report", "letter")] == [
-        str(results / f"{one}.html") for one in ("report", "letter")
+        str(results / f"{page}.html") for page in ("report", "letter")
     ]
     assert 'class="summary letter"' in (results / "letter.html").read_text(encoding="utf-8")
     assert run("report", results).status == 0
@@ -84,7 +84,7 @@ def test_export_says_what_the_tables_say(fit, results):
     np.testing.assert_array_equal(plain["trials"][trial.name]["moments"]["knee_angle_r"], moments.knee_angle_r)
     mat = loadmat(folder / "tables.mat", simplify_cells=True)
     np.testing.assert_array_equal(mat["bsp"]["estimate"], fit.bsp.estimate)
-    assert [each.rstrip() for each in mat["bsp"]["segment"]] == list(fit.bsp.segment)
+    assert [segment.rstrip() for segment in mat["bsp"]["segment"]] == list(fit.bsp.segment)
     assert mat["trials"]["name"] == trial.name
     angle = np.degrees(trial.coordinates.knee_angle_r)
     np.testing.assert_allclose(mat["trials"]["coordinates"]["knee_angle_r"], angle, rtol=1e-12)

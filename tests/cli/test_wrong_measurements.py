@@ -16,17 +16,17 @@ def test_markers_swapped_for_the_whole_trial(lab):
     expect_found(refused(lab), "L202", {"trial": "walk", "markers": ["R.Heel", "L.Heel"]})
 
 
-def exchange(one, other):
+def exchange(label, other):
     def swap(positions, index):
-        positions[:, [index(one), index(other)]] = positions[:, [index(other), index(one)]]
+        positions[:, [index(label), index(other)]] = positions[:, [index(other), index(label)]]
 
     return swap
 
 
 def test_outer_and_inner_labels_swapped_in_the_static_trial(lab):
-    one, other = "L.Ankle.Lat", "L.Ankle.Med"
-    changed_markers(lab / "static.trc", exchange(one, other))
-    expect_found(refused(lab), "L208", {"trial": "static", "markers": [one, other]}, joint="left ankle")
+    outer, other = "L.Ankle.Lat", "L.Ankle.Med"
+    changed_markers(lab / "static.trc", exchange(outer, other))
+    expect_found(refused(lab), "L208", {"trial": "static", "markers": [outer, other]}, joint="left ankle")
     assert_checked(lab, "L208")
 
 

@@ -8,7 +8,7 @@ from kinertia.cohort.job import guessed_seconds
 
 
 def people(*frames):
-    return [SimpleNamespace(frames=each) for each in frames]
+    return [SimpleNamespace(frames=frame) for frame in frames]
 
 
 def test_a_cohort_takes_no_less_than_its_longest_fit():

@@ -33,9 +33,9 @@ def fitted(folder, program, *names, workers=1, memory_bytes=PLENTY):
 
 def test_one_process_fits_one_person_after_another(tmp_path):
     ended = list(fitted(tmp_path, "answer(job)", "Anna", "Ben", "Clara"))
-    assert [one.record.person for one in ended] == ["Anna", "Ben", "Clara"]
-    assert len({one.worker for one in ended}) == 1
-    assert len({one.worker for one in fitted(tmp_path, "time.sleep(0.3); answer(job)", "A", "B", workers=2)}) == 2
+    assert [ending.record.person for ending in ended] == ["Anna", "Ben", "Clara"]
+    assert len({ending.worker for ending in ended}) == 1
+    assert len({ending.worker for ending in fitted(tmp_path, "time.sleep(0.3); answer(job)", "A", "B", workers=2)}) == 2
 
 
 @pytest.mark.parametrize(("kills", "status"), [(2, 0), (3, 70)])
@@ -47,8 +47,8 @@ with tried.open("a") as file:
 if job["person"] == "Anna" and len(tried.read_text()) <= {kills}:
     os._exit(9)
 answer(job)"""
-    records = {one.record.person: one.record for one in fitted(tmp_path, program, "Anna", "Ben")}
-    assert {name: one.status for name, one in records.items()} == {"Anna": status, "Ben": 0}
+    records = {ending.record.person: ending.record for ending in fitted(tmp_path, program, "Anna", "Ben")}
+    assert {name: ending.status for name, ending in records.items()} == {"Anna": status, "Ben": 0}
     assert (tmp_path / "Anna").read_text() == 3 * "x"
     assert (tmp_path / "Ben").read_text() == "x"
     assert records["Anna"].inputs == ""
@@ -63,7 +63,7 @@ if job["person"] == "Anna":
     time.sleep(60)
 answer(job)"""
     ended = fitted(tmp_path, program, "Anna", "Ben", workers=2, memory_bytes=200 * 1024**2)
-    assert {one.record.person: one.record.status for one in ended} == {"Anna": 70, "Ben": 0}
+    assert {ending.record.person: ending.record.status for ending in ended} == {"Anna": 70, "Ben": 0}
 
 
 def test_processes_end_with_whoever_waits_for_them(tmp_path):
@@ -72,11 +72,11 @@ def test_processes_end_with_whoever_waits_for_them(tmp_path):
     )
     begun = time.monotonic()
     assert next(ended).record.person == "Anna"
-    running = [one for one in psutil.Process().children() if any(LEAD in word for word in one.cmdline())]
+    running = [process for process in psutil.Process().children() if any(LEAD in word for word in process.cmdline())]
     assert running
     ended.close()
     assert time.monotonic() - begun < 30.0
-    assert not any(one.is_running() and one.status() != psutil.STATUS_ZOMBIE for one in running)
+    assert not any(process.is_running() and process.status() != psutil.STATUS_ZOMBIE for process in running)
 
 
 def test_a_worker_ends_with_its_input():

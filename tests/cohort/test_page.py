@@ -49,8 +49,8 @@ def test_the_page_says_who_passed_and_who_is_far(cohort):
 
 def found(person, code, severity="WARNING", status="open", muted_by=None, value=None, unit=None):
     """A row of the table of findings."""
-    of = {"severity": severity, "status": status, "muted_by": muted_by, "value": value, "unit": unit}
-    return {"person": person, "code": code, **of}
+    columns = {"severity": severity, "status": status, "muted_by": muted_by, "value": value, "unit": unit}
+    return {"person": person, "code": code, **columns}
 
 
 @pytest.fixture
@@ -106,8 +106,8 @@ def test_codes_that_are_overruled_in_vain_are_listed(people):
 
 def rows_of(changes, sd):
     """A table of one parameter: change and error bar per person."""
-    of = {"segment": "thigh_r", "parameter": "mass", "literature": 8.0, "sd": sd}
-    return pd.DataFrame([{"person": f"p{k}", "estimate": 8.0 + change, **of} for k, change in enumerate(changes)])
+    columns = {"segment": "thigh_r", "parameter": "mass", "literature": 8.0, "sd": sd}
+    return pd.DataFrame([{"person": f"p{k}", "estimate": 8.0 + change, **columns} for k, change in enumerate(changes)])
 
 
 def test_few_people_who_are_close_together_by_chance_make_no_outlier():
@@ -162,9 +162,9 @@ def test_a_cohort_of_whom_nobody_was_fitted_has_a_page(tmp_path):
 
 
 def instrument(person, day, value, sd, prior_sd=0.01, with_session=False):
-    of = {"kind": "plate", "plate": "plate 1", "trial": None, "quantity": "gain", "axis": None, "unit": "1"}
-    of["with_session"] = with_session
-    return {"person": person, "date": day, "value": value, "sd": sd, "prior_sd": prior_sd, **of}
+    columns = {"kind": "plate", "plate": "plate 1", "trial": None, "quantity": "gain", "axis": None, "unit": "1"}
+    columns["with_session"] = with_session
+    return {"person": person, "date": day, "value": value, "sd": sd, "prior_sd": prior_sd, **columns}
 
 
 def test_a_day_is_what_its_people_say_together_with_one_prior():

@@ -25,8 +25,8 @@ SOURCES = dict.fromkeys(("instruments", "body", "markers", "stride"), 0.01)
 
 
 def change(after, component="adduction", event="mid-stance", doubt=""):
-    own = ("moment", "knee", component, "r", event, "N m/kg")
-    return Change(*own, 0.5, after, (3, 3), 0.02, SOURCES, 0.05, 0.01, (0.1, np.nan), doubt=doubt)
+    outcome = ("moment", "knee", component, "r", event, "N m/kg")
+    return Change(*outcome, 0.5, after, (3, 3), 0.02, SOURCES, 0.05, 0.01, (0.1, np.nan), doubt=doubt)
 
 
 @pytest.fixture
@@ -51,7 +51,7 @@ def study(tmp_path, c3d_lab):
 
 def test_pairs_are_sessions_of_a_person_or_else_conditions(study, tmp_path):
     people = people_of(study, tmp_path / "out")
-    assert [(one.name, one.person, one.session) for one in people] == [
+    assert [(participant.name, participant.person, participant.session) for participant in people] == [
         ("Anna before", "Anna", "before"), ("Anna after", "Anna", "after"), ("Ben", "Ben", ""),
     ]  # fmt: skip
     assert pairs_of(people, BOTH) == [Pair("Anna", ("Anna before", "Anna after")), Pair("Ben", ("Ben",))]
@@ -105,7 +105,7 @@ def run(cohort, pairs):
 def test_one_failure_leaves_the_others_and_what_is_known_is_not_computed_again(fitted):
     cohort, pairs, calls = fitted
     found = run(cohort, pairs)
-    assert [len(one.changes) for one in found] == [2, 2, 0, 0, 0]
+    assert [len(changed.changes) for changed in found] == [2, 2, 0, 0, 0]
     assert "no trial" in found[2].remarks
     assert found[3].remarks == "not fitted: Dora"
     assert found[4].remarks == "one of both is lacking"

@@ -30,9 +30,9 @@ def test_who_lacks_a_subject_file_is_named_with_what_to_do(tmp_path):
     emil = person(tmp_path / "Emil")
     (emil / "walk.csv").write_text("Trajectories\n100\nFrame,Sub Frame,X,Y,Z\n", encoding="utf-8")
     person(tmp_path / "lists", "people.csv")
-    one, two, three = people_of(tmp_path, tmp_path / "out")
+    first, two, three = people_of(tmp_path, tmp_path / "out")
     assert three == Participant("Emil", None, f"no subject file; kinertia init {emil} drafts one")
-    assert one == Participant(
+    assert first == Participant(
         "Clara Z", None, f"no subject file; {command_line(['kinertia', 'init', str(clara)])} drafts one"
     )
     assert two.subject is None
@@ -50,7 +50,7 @@ def test_nobody_is_dropped_whose_files_are_one_folder_deeper_or_not_fetched(tmp_
         person(tmp_path / "Dora").joinpath("walk.c3d").symlink_to("not fetched")
     except OSError:
         pytest.skip("this system allows no links")
-    people = {one.name: one for one in people_of(tmp_path, tmp_path / "out")}
+    people = {participant.name: participant for participant in people_of(tmp_path, tmp_path / "out")}
     assert [*people] == ["Anna", "Ben", "Clara", "Dora"]
     assert people["Anna"].problem.startswith(
         "no subject file, but there are files in its folders 2026-05-03, 2026-06-10;"

@@ -105,10 +105,10 @@ def test_who_is_there_twice_is_fitted_once(subject, tmp_path):
     people = [Participant("Anna", subject), Participant("Anna - Copy", copy), Participant("B", subject)]
     first, *twins = standings(people, tmp_path / "out")
     assert first.due
-    assert [one.due for one in twins] == [False, False]
-    assert all("the same files and settings as 'Anna'" in one.problem for one in twins)
+    assert [twin.due for twin in twins] == [False, False]
+    assert all("the same files and settings as 'Anna'" in twin.problem for twin in twins)
     changed(copy, "[model]", "[settings]\ncutoff_hz = 6.0\n[model]")
-    assert [one.due for one in standings(people[:2], tmp_path / "out")] == [True, True]
+    assert [person.due for person in standings(people[:2], tmp_path / "out")] == [True, True]
 
 
 def test_logs_of_people_at_work_in_a_killed_run_are_swept(tmp_path):

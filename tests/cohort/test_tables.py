@@ -19,7 +19,7 @@ from kinertia.io.versions import VERSION
 
 FOUND = (
     replace(RESIDUAL, where=Where(trial="early")),
-    *(replace(one, where=replace(one.where, trial="late")) for one in (ZERO, UNEXPLAINED, WAIVED)),
+    *(replace(reported, where=replace(reported.where, trial="late")) for reported in (ZERO, UNEXPLAINED, WAIVED)),
 )
 PEOPLE = ("Ben", "=cmd", "Anna")
 RECORDS = [
@@ -80,13 +80,13 @@ def test_findings_are_rows_with_their_headline_and_those_of_people_without_resul
     assert list(rows.columns) == [
         "person", "trial", "plate", "code", "severity", "status", "muted_by", "value", "unit",
     ]  # fmt: skip
-    own = rows[rows.person == "Anna"].set_index("code")
-    assert own.index.tolist() == [one.code for one in FOUND]
-    assert own.loc["P213", ["trial", "plate", "severity", "status", "value", "unit"]].tolist() == [
+    of_person = rows[rows.person == "Anna"].set_index("code")
+    assert of_person.index.tolist() == [reported.code for reported in FOUND]
+    assert of_person.loc["P213", ["trial", "plate", "severity", "status", "value", "unit"]].tolist() == [
         "late", "plate 1", "WARNING", "open", -23.1, "N",
     ]  # fmt: skip
-    assert own.muted_by["P214"] == "P213"
-    assert own.status["P244"] == "waived"
+    assert of_person.muted_by["P214"] == "P213"
+    assert of_person.status["P244"] == "waived"
     assert rows[rows.person == "Clara"].code.tolist() == ["P271"]
 
 

@@ -19,7 +19,7 @@ from plate_limits import PLATE_LIMITS
 from result_limits import RESULT_LIMITS
 
 CASES = {**FILE_LIMITS, **MARKER_LIMITS, **PLATE_LIMITS, **PERSON_LIMITS, **RESULT_LIMITS}
-USED = {(code, name) for code, one in all_rules().items() for name in names_in(one)}
+USED = {(code, name) for code, entry in all_rules().items() for name in names_in(entry)}
 """Codes and names of limits in texts of the catalogue."""
 NOT_TRIED = {
     "F122": "largest smallest",
@@ -111,7 +111,7 @@ def test_limits(key, monkeypatch):
     code, _ = tried(key)
     for value, expected in ((within, few), (beyond, more)):
         patched = [monkeypatch] * ("patched" in check.__code__.co_varnames[: check.__code__.co_argcount])
-        found = [one.severity.name for one in check(value, *patched) if one.code == code]
+        found = [finding.severity.name for finding in check(value, *patched) if finding.code == code]
         assert found == expected, value
 
 
@@ -134,10 +134,10 @@ def test_every_limit_is_tried_or_listed():
 def test_every_limit_that_is_declared_is_in_a_text():
     """Else nobody reads it."""
     unread = [
-        (one.codes, name)
-        for one in ALL_CHECKS
-        for name in one.limits
-        if not USED & {(code, name) for code in one.codes}
+        (check.codes, name)
+        for check in ALL_CHECKS
+        for name in check.limits
+        if not USED & {(code, name) for code in check.codes}
     ]
     assert unread == []
 
@@ -151,19 +151,21 @@ NUMBERS = (
 
 def test_numbers_of_texts_are_those_of_limits():
     """One that is written out would not change with the check."""
-    texts = {code: f"{one.detects} {one.escalation}" for code, one in all_rules().items()}
+    texts = {code: f"{entry.detects} {entry.escalation}" for code, entry in all_rules().items()}
     written = {code: re.sub(r"\{[^}]*\}|\b[A-Z]+\d\w*\b", "", text) for code, text in texts.items()}
     assert {code for code, text in written.items() if re.search(r"\d", text)} == set(NUMBERS.split())
 
 
 def test_texts_have_no_names_left():
-    assert [one.code for one in map(with_limits, all_rules().values()) if "{" in one.detects + one.escalation] == []
+    assert [
+        entry.code for entry in map(with_limits, all_rules().values()) if "{" in entry.detects + entry.escalation
+    ] == []
 
 
 def test_checks_run_after_those_that_may_make_them_meaningless():
     checks = tuple(reversed(ALL_CHECKS))
     order = in_order(tuple(dict.fromkeys(checks)))
-    assert all(not one.needs(later) for k, one in enumerate(order) for later in order[k:])
+    assert all(not check.needs(later) for k, check in enumerate(order) for later in order[k:])
 
 
 def test_a_limit_is_the_same_in_another_process():

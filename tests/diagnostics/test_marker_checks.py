@@ -70,8 +70,8 @@ def in_millimetres(places, time):
 def test_one_fault_has_one_cause(fault, code, severity, recording_of):
     walk = recording_of("synthetic/walk.c3d").markers
     context = context_of(changed(walk, fault), choose_marker_set(walk.labels))
-    open_findings = [one for one in explained(asked(MOTION, context)) if one.is_open]
-    assert {(one.code, one.severity) for one in open_findings} == {(code, severity)}
+    open_findings = [finding for finding in explained(asked(MOTION, context)) if finding.is_open]
+    assert {(finding.code, finding.severity) for finding in open_findings} == {(code, severity)}
 
 
 def test_labels_that_change_sides_are_no_missing_frames(recording_of):
@@ -79,11 +79,11 @@ def test_labels_that_change_sides_are_no_missing_frames(recording_of):
     walk = recording_of("synthetic/walk.c3d").markers
     twins = [label.translate(str.maketrans("RL", "LR", "")) if label[:1] in "RL" else label for label in walk.labels]
     order = [walk.labels.index(twin) if twin in walk.labels else k for k, twin in enumerate(twins)]
-    assert sum(k != own for k, own in enumerate(order)) > len(order) / 2
+    assert sum(k != own_place for k, own_place in enumerate(order)) > len(order) / 2
 
     def exchanged(places, time):
         places[180:] = places[180:, order]
 
     context = context_of(changed(walk, exchanged), choose_marker_set(walk.labels))
-    open_findings = [one for one in explained(asked(MOTION, context)) if one.is_open]
-    assert {one.code for one in open_findings} == {"L211"}
+    open_findings = [finding for finding in explained(asked(MOTION, context)) if finding.is_open]
+    assert {finding.code for finding in open_findings} == {"L211"}

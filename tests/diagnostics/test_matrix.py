@@ -39,7 +39,7 @@ TRUE = {"gait2354": {"P266"}, "plug-in gait b": {"P272", "P282"}}
 def codes_in(path):
     """Codes in the texts of a module."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
-    texts = [one.value for one in ast.walk(tree) if isinstance(one, ast.Constant) and isinstance(one.value, str)]
+    texts = [node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)]
     return {code for text in texts for code in re.findall(r"\b[FMLPTSOR]\d{3}\b", text)}
 
 
@@ -54,7 +54,7 @@ def test_every_code_is_asserted_by_a_test():
 def test_every_code_is_silent_on_a_fault_free_walk(recording_of, name):
     mass_kg, height_m = PEOPLE[name]
     found = check_recording(recording_of(*WALKS[name]), mass_kg=mass_kg, height_m=height_m).findings
-    assert {one.code for one in found if one.severity > Severity.CORRECTED} == TRUE.get(name, set())
+    assert {reported.code for reported in found if reported.severity > Severity.CORRECTED} == TRUE.get(name, set())
 
 
 @pytest.mark.parametrize("name", sorted(WALKS.keys() & {"synthetic", "gait2354"}))
@@ -67,7 +67,7 @@ def test_one_repeated_frame_is_no_other_fault(recording_of, name, share):
     places[frame] = places[frame - 1]
     copied = replace(recording, markers=replace(recording.markers, positions=places))
     found = check_recording(copied, mass_kg=mass_kg, height_m=height_m).findings
-    grave = {one.code for one in found if one.is_open and one.severity > Severity.CORRECTED}
+    grave = {reported.code for reported in found if reported.is_open and reported.severity > Severity.CORRECTED}
     assert grave == TRUE.get(name, set()) | {"M122"}
 
 
@@ -80,13 +80,13 @@ def test_a_run_with_few_frames_a_second_is_no_fault_of_the_rates(recording_of, n
     markers = recording.markers
     few = Markers(markers.time[::step], markers.labels, markers.positions[::step])
     found = check_recording(replace(recording, markers=few)).findings
-    assert not [one.code for one in found if one.is_open and one.severity is Severity.ERROR]
+    assert not [reported.code for reported in found if reported.is_open and reported.severity is Severity.ERROR]
 
 
-@pytest.mark.parametrize("code", [code for code, one in RULES.items() if one.supersedes])
+@pytest.mark.parametrize("code", [code for code, rule_ in RULES.items() if rule_.supersedes])
 def test_a_cause_mutes_what_it_explains_where_it_was_found(code):
     """And takes over its severity; elsewhere it says nothing of it."""
-    for other in sorted({each for one in RULES[code].supersedes for each in matching(one)}):
+    for other in sorted({consequence for entry in RULES[code].supersedes for consequence in matching(entry)}):
         here, there = Where(trial="walk", plate="left"), Where(trial="run", plate="left")
         cause, muted, apart = explained(
             [finding(code, here), finding(other, here, Severity.ERROR), finding(other, there)]

@@ -46,12 +46,12 @@ def short(count):
     return change
 
 
-def loads(of):
+def loads(frames):
     """Forces that are zero in part."""
 
     def change(recording):
         force = recording.plates.force.copy()
-        force[of] = 0.0
+        force[frames] = 0.0
         return replace(recording, plates=replace(recording.plates, force=force))
 
     return change

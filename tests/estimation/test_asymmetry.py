@@ -37,7 +37,11 @@ def test_a_mirrored_body_is_alike():
 
 @pytest.mark.parametrize(("sds", "beyond"), [(2.6, False), (3.2, True)])
 def test_a_difference_counts_beyond_its_own_error_bar(sds, beyond):
-    (pair,) = (one for one in asymmetries(changed("foot_r", "mass", sds), PRIOR.covariance) if one.segment == "foot")
+    (pair,) = (
+        asymmetry
+        for asymmetry in asymmetries(changed("foot_r", "mass", sds), PRIOR.covariance)
+        if asymmetry.segment == "foot"
+    )
     assert pair.differing == ((0,) if beyond else ())
     assert pair.sd[0] == pytest.approx(PRIOR.sd[SEGMENTS.index("foot_r"), 0] * np.sqrt(0.2), rel=1e-6)
 

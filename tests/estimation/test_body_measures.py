@@ -21,21 +21,21 @@ from validation.usual_build import stadium_mass_kg, stature_m
 yeadon = pytest.importorskip("yeadon", reason="needs yeadon (pip install -e '.[test]')")
 WALKER = walking_subject()
 PRIOR = literature_prior(WALKER.literature)
-NAMES = [one.name for one in measures()]
+NAMES = [measure.name for measure in measures()]
 MAN = stadium_people()["Dan"]
 MAN_KG, MAN_M = stadium_mass_kg(MAN.measures_m), float(stature_m(MAN.measures_m[None])[0])
 
 
-def stated(chosen=lambda one: True, factor=1.0):
+def stated(chosen=lambda measure: True, factor=1.0):
     """A whole sheet."""
     rows = zip(measures(), MAN.measures_m, strict=True)
-    return {one.name: (factor * value, one.sd_m) for one, value in rows if chosen(one)}
+    return {measure.name: (factor * value, measure.sd_m) for measure, value in rows if chosen(measure)}
 
 
 def test_more_measurements_say_more():
     few, many = (
         measured_body(stated(which), {"leg_knee_length": 0.42}, 0.08, MAN_KG, MAN_M)
-        for which in (lambda one: one.first, lambda one: True)
+        for which in (lambda measure: measure.first, lambda measure: True)
     )
     sd = [np.sqrt(np.diag(body.covariance)) / np.abs(body.values.ravel()) for body in (few, many)]
     assert np.all(sd[1] <= 1.02 * sd[0])
@@ -70,7 +70,9 @@ def test_the_prior_moves_towards_the_measured_body_and_keeps_what_girths_do_not_
         for name in NAMES
         if name.startswith("leg_") and "girth" in name
     }
-    (prior, body), (plain, _) = (with_measures(PRIOR, WALKER.skeleton, each, MASS_KG, HEIGHT_M) for each in (thick, {}))
+    (prior, body), (plain, _) = (
+        with_measures(PRIOR, WALKER.skeleton, stated_measures, MASS_KG, HEIGHT_M) for stated_measures in (thick, {})
+    )
     names = PRIOR.mean.segments
     thigh, left = names.index("thigh_r"), names.index("thigh_l")
     assert prior.mean.mass_kg[thigh] > plain.mean.mass_kg[thigh] + 0.2 * PRIOR.sd[thigh, 0]
@@ -88,7 +90,7 @@ def test_the_prior_moves_towards_the_measured_body_and_keeps_what_girths_do_not_
 def test_a_usual_person_stays_near_the_tables():
     """Cuts and densities of tables and stadiums differ; that must not pass for knowledge of the person."""
     expected, _ = expected_measures(MASS_KG, HEIGHT_M)
-    usual = {one.name: (value, one.sd_m) for one, value in zip(measures(), np.exp(expected), strict=True)}
+    usual = {measure.name: (value, measure.sd_m) for measure, value in zip(measures(), np.exp(expected), strict=True)}
     prior, _ = with_measures(PRIOR, WALKER.skeleton, usual, MASS_KG, HEIGHT_M)
     moved = (prior.mean.table() - PRIOR.mean.table()) / PRIOR.sd
     assert np.abs(moved).max() < 2.0
@@ -110,11 +112,11 @@ def test_of_a_prosthesis_nothing_was_measured():
 def test_slips_are_named():
     wrong = {**stated(), "leg_mid_girth": (0.25, 0.007), "trunk_rib_width": (0.45, 0.01)}
     *far, across = measured_body(wrong, {}, 0.08, MAN_KG, MAN_M).findings
-    assert {one.code for one in (*far, across)} == {"S403"}
-    assert {one.severity.name for one in (*far, across)} == {"WARNING"}
-    for one, name in zip(far, ("trunk_rib_width", "leg_mid_girth"), strict=True):
-        assert (one.where.part, one.evidence["value_m"].value) == (name, wrong[name][0])
-        assert one.evidence["expected_m"].value == pytest.approx(stated()[name][0], rel=0.1)
+    assert {finding.code for finding in (*far, across)} == {"S403"}
+    assert {reported.severity.name for reported in (*far, across)} == {"WARNING"}
+    for finding, name in zip(far, ("trunk_rib_width", "leg_mid_girth"), strict=True):
+        assert (finding.where.part, finding.evidence["value_m"].value) == (name, wrong[name][0])
+        assert finding.evidence["expected_m"].value == pytest.approx(stated()[name][0], rel=0.1)
     assert across.evidence["ratio"].value == pytest.approx(stated()["trunk_rib_girth"][0] / 0.45)
 
 
@@ -153,14 +155,14 @@ def test_a_filled_in_sheet_is_part_of_the_prior_and_of_the_notes(c3d_lab, tmp_pa
     ready = prepare_subject(path)
     thigh = ready.prior.mean.segments.index("thigh_r")
     assert ready.prior.mean.mass_kg[thigh] > ready.literature.mass_kg[thigh]
-    sources = [one.evidence["source"].value for one in ready.findings if one.code == "S408"]
+    sources = [finding.evidence["source"].value for finding in ready.findings if finding.code == "S408"]
     assert any("2 of 58" in source and "measures.csv" in source for source in sources)
-    assert [one.where.part for one in ready.findings if one.code == "S403"] == ["leg_calf_girth"]
-    assert "S404" not in {one.code for one in ready.findings}
+    assert [finding.where.part for finding in ready.findings if finding.code == "S403"] == ["leg_calf_girth"]
+    assert "S404" not in {finding.code for finding in ready.findings}
     of_another = with_known_body(
         replace(ready, findings=()), PriorFiles(), None, {}, measures=BodyMeasures("dan.csv", stated(factor=1.1))
     )
-    (found,) = [one for one in of_another.findings if one.code == "S404"]
+    (found,) = [finding for finding in of_another.findings if finding.code == "S404"]
     assert (found.where.file, found.evidence["stated_kg"].value) == ("dan.csv", ready.total_mass.body_kg)
     assert found.evidence["yeadon_kg"].value > 1.2 * ready.total_mass.body_kg
 
@@ -169,7 +171,7 @@ def test_what_is_a_prosthesis_on_both_sides_says_nothing_of_the_others():
     """The errors of what was not measured go with those of what was; they must not be taken for measured."""
     names, feet = PRIOR.mean.segments, ("foot_r", "foot_l")
     whole, without = (
-        with_measures(PRIOR, WALKER.skeleton, stated(), MASS_KG, HEIGHT_M, each)[0] for each in ((), feet)
+        with_measures(PRIOR, WALKER.skeleton, stated(), MASS_KG, HEIGHT_M, prosthesis)[0] for prosthesis in ((), feet)
     )
     apart = (without.mean.table() - whole.mean.table()) / PRIOR.sd
     others = [k for k, name in enumerate(names) if name not in feet]

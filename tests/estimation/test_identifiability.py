@@ -105,12 +105,14 @@ def test_two_trials_show_more_than_one(person, trial, base):
 
 
 def test_long_motions_are_told_by_some_of_their_frames(person, trial, monkeypatch):
-    prior, each = literature_prior(person.literature), [trial.motion] * 3
-    every = base_parameters(trial.skeleton, person.literature, prior.sd, each, [ROOT_SD] * 3)
+    prior, motions = literature_prior(person.literature), [trial.motion] * 3
+    every = base_parameters(trial.skeleton, person.literature, prior.sd, motions, [ROOT_SD] * 3)
     monkeypatch.setattr(identifiability, "_ENOUGH_FRAMES", len(trial.time))
-    some = base_parameters(trial.skeleton, person.literature, prior.sd, each, [ROOT_SD] * 3)
+    some = base_parameters(trial.skeleton, person.literature, prior.sd, motions, [ROOT_SD] * 3)
     assert (some.count, some.never) == (every.count, every.never)
-    np.testing.assert_allclose([one.gain for one in some.best], [one.gain for one in every.best], rtol=0.2)
+    np.testing.assert_allclose(
+        [combination.gain for combination in some.best], [combination.gain for combination in every.best], rtol=0.2
+    )
     assert some.best[0].words == every.best[0].words
 
 

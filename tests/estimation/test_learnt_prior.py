@@ -62,7 +62,7 @@ def test_left_out_people_are_estimated_better_and_their_error_bars_hold():
 
 def test_where_people_say_nothing_the_mean_stays_and_bars_grow():
     _, _, people = group(np.random.default_rng(0), 20)
-    silent = [replace(one, information=np.zeros((SIZE, SIZE)), rhs=np.zeros(SIZE)) for one in people]
+    silent = [replace(person, information=np.zeros((SIZE, SIZE)), rhs=np.zeros(SIZE)) for person in people]
     learnt = learn(silent)
     np.testing.assert_allclose(learnt.mean, 0.0, atol=1e-12)
     np.testing.assert_allclose(np.diag(learnt.covariance), BETWEEN + WITHIN, rtol=1e-6)
@@ -117,9 +117,9 @@ def test_the_mean_of_obese_people_is_recovered_and_left_out_people_profit(fit):
 def test_the_prior_of_a_person_is_about_his_own_literature():
     _, _, people = group(np.random.default_rng(2), 20)
     learnt = learn(people)
-    own = learnt.of(PRIOR)
-    np.testing.assert_allclose((own.mean.table() - PRIOR.mean.table()).ravel(), learnt.mean * PRIOR.sd.ravel())
-    np.testing.assert_allclose(own.sd.ravel(), np.sqrt(np.diag(learnt.covariance)) * PRIOR.sd.ravel())
+    of_person = learnt.of(PRIOR)
+    np.testing.assert_allclose((of_person.mean.table() - PRIOR.mean.table()).ravel(), learnt.mean * PRIOR.sd.ravel())
+    np.testing.assert_allclose(of_person.sd.ravel(), np.sqrt(np.diag(learnt.covariance)) * PRIOR.sd.ravel())
     with pytest.raises(PriorError, match="S405"):
         learnt.of(WHOLE)
 

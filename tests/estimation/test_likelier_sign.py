@@ -52,8 +52,8 @@ def person(trial, *factors, offset=0.0, noise_m=0.003):
         loads[..., 4] += np.where(carried, (factor - 1.0) * free_moment(loads), 0.0)
         loads[:, 1, 4] += offset * loads[:, 1, 1]
         markers = camera_noise(trial.markers, noise_m, np.random.default_rng(seed))
-        one = kinematics_of(trial, markers, loads)
-        kinematics.append(replace(one, trial=replace(one.trial, name=f"walk {seed}")))
+        solved = kinematics_of(trial, markers, loads)
+        kinematics.append(replace(solved, trial=replace(solved.trial, name=f"walk {seed}")))
     return Person(trial.skeleton, walking_subject().literature, tuple(kinematics))
 
 
@@ -82,10 +82,10 @@ def signed(ready):
     """The outcome, and how many estimates it took."""
     fits = []
 
-    def fit(one: Person, otherwise: Sequence[Kinematics]):
-        fits.append(one)
-        prior = literature_prior(one.literature)
-        return fit_simultaneous(one.skeleton, prior, one.kinematics, otherwise=otherwise)
+    def fit(prepared: Person, otherwise: Sequence[Kinematics]):
+        fits.append(prepared)
+        prior = literature_prior(prepared.literature)
+        return fit_simultaneous(prepared.skeleton, prior, prepared.kinematics, otherwise=otherwise)
 
     with threadpool_limits(1, user_api="blas"):
         return with_likelier_sign(ready, fit), len(fits)
@@ -178,10 +178,10 @@ def test_files_whose_sign_is_wrong(measured_folder, tmp_path, name, corrected):
     }
     options = [word for option, file in files.items() for word in (f"--{option}", lab / file)]
     fit = fitted(tmp_path / "out", lab / f"{name}.trc", *options, "--calibrate", "--mass", "62.6").summary
-    codes = [one["code"] for one in fit["findings"]]
+    codes = [finding["code"] for finding in fit["findings"]]
     assert codes.count("P269") == int(corrected)
     assert "P265" not in codes
-    free = [one["value"] for one in fit["calibration"] if one["quantity"] == "free moment"]
+    free = [entry["value"] for entry in fit["calibration"] if entry["quantity"] == "free moment"]
     assert np.abs(free).max() < 0.003
 
 
@@ -191,7 +191,7 @@ def test_files_whose_sign_is_right(measured_folder, tmp_path, name):
     lab = measured_folder / "field" / "hamner_treadmill_run"
     options = ["--forces", lab / f"{name}_grf.mot", "--model", lab / "final.osim", "--mass", "72.84", "--calibrate"]
     fit = fitted(tmp_path / "out", lab / f"{name}.trc", *options).summary
-    assert "P269" not in [one["code"] for one in fit["findings"]]
+    assert "P269" not in [finding["code"] for finding in fit["findings"]]
 
 
 @pytest.mark.parametrize(

@@ -80,7 +80,7 @@ def test_arms_rotate_where_bent_elbows_show_it(skeleton):
     trial = jump(skeleton)
     rotating = with_rotating_arms(skeleton, [trial])
     assert set(UPPER_ARM_ROTATIONS) <= set(rotating.coordinates)
-    before, after = (first_poses(one, [trial])[0].marker_rms_m for one in (skeleton, rotating))
+    before, after = (first_poses(candidate, [trial])[0].marker_rms_m for candidate in (skeleton, rotating))
     assert before > 0.015
     assert after < 0.001
 

@@ -104,8 +104,8 @@ def assert_targets(folder: Path) -> None:
         assert trial["marker_rms_m"]["final"] <= 0.012
     bsp = pd.read_csv(folder / "bsp.csv").query("prior_sd > 0")
     far = bsp[(bsp["estimate"] - bsp["literature"]).abs() > 3 * bsp["prior_sd"]]
-    found = [one for one in summary["findings"] if one["code"] == "R203"]
-    named = {(one["evidence"]["parameter"]["value"], one["where"]["part"].split()[-1]) for one in found}
+    found = [finding for finding in summary["findings"] if finding["code"] == "R203"]
+    named = {(finding["evidence"]["parameter"]["value"], finding["where"]["part"].split()[-1]) for finding in found}
     assert named == set(zip(far["parameter"], far["segment"], strict=True))
 
 
@@ -125,9 +125,9 @@ def test_walks_and_squats_pooled(measured_folder, tmp_path):
     assert_targets(folder)
     summary = json.loads((folder / "fit.json").read_text())
     assert [trial["name"] for trial in summary["trials"]] == ["walking1", "walking2", "squats1"]
-    corrected = [one for one in summary["findings"] if one["code"] == "P277"]
+    corrected = [finding for finding in summary["findings"] if finding["code"] == "P277"]
     assert ("ForcePlate2", "left") in [
-        (one["where"]["plate"][:11], one["evidence"]["foot"]["value"]) for one in corrected
+        (finding["where"]["plate"][:11], finding["evidence"]["foot"]["value"]) for finding in corrected
     ]
     assert (folder / "walking2" / "kinematics.mot").is_file()
 
@@ -147,8 +147,8 @@ def test_page_of_models(fit_with_model):
         residual = trial["residual_force_rms_N"]["estimate"], trial["residual_moment_rms_Nm"]["estimate"]
         cells = rf"\| {trial['marker_rms_m']['final'] * 1e3:.1f} \|.*\| {residual[0]:.1f} \|.*\| {residual[1]:.1f} \|"
         assert re.search(rf"\| {title}: subject01_walk1 .*{cells}", page)
-        for each in messages_of(summary):
-            assert f"- {title}: {each}" in page
+        for message in messages_of(summary):
+            assert f"- {title}: {message}" in page
 
 
 @pytest.mark.slow

@@ -242,8 +242,8 @@ def test_files_of_somebody_whom_the_tables_do_not_describe_say_so(demo_run, tmp_
     lab = shutil.copytree(demo_run[1] / "lab", tmp_path / "lab")
     text = (lab / "subject.toml").read_text(encoding="utf-8")
     (lab / "subject.toml").write_text(text.replace("height_m = 1.803", entries), encoding="utf-8")
-    found = [one for one in prepare_subject(lab / "subject.toml").findings if one.code == "S401"]
-    assert [one.evidence["population"].value for one in found] == populations
+    found = [finding for finding in prepare_subject(lab / "subject.toml").findings if finding.code == "S401"]
+    assert [finding.evidence["population"].value for finding in found] == populations
 
 
 def test_masses_of_the_elderly_are_those_of_their_table():
@@ -315,9 +315,9 @@ def test_people_of_the_prior_are_rarely_unlike_it_and_others_are():
     """An estimate that knows everything is the person: squares of the distance are chi-square."""
     rng, exact = np.random.default_rng(0), 1e-6 * PRIOR.covariance
     people = [mahalanobis_distance(PRIOR, PRIOR.draw(rng), exact) for _ in range(200)]
-    assert {one.combinations for one in people} == {120}
-    assert np.mean([one.chance < 0.05 for one in people]) < 0.15
-    assert np.mean([one.implausible for one in people]) < 0.03
+    assert {person.combinations for person in people} == {120}
+    assert np.mean([person.chance < 0.05 for person in people]) < 0.15
+    assert np.mean([person.implausible for person in people]) < 0.03
     light = PRIOR.mean.table()
     light[SEGMENTS.index("shank_l"), 0] *= 0.5
     far = mahalanobis_distance(PRIOR, BodySegmentParameters.from_table(SEGMENTS, light), exact)
@@ -340,10 +340,10 @@ def test_people_of_the_prior_are_rarely_unlike_it_and_others_are():
 
 @pytest.mark.slow
 def test_an_undeclared_prosthesis_is_named_and_a_declared_one_is_estimated_better():
-    adults, own = run_person(1, ("prosthesis", 0))
+    adults, declared = run_person(1, ("prosthesis", 0))
     assert adults.unlike
-    assert not own.unlike
+    assert not declared.unlike
     rows = [SEGMENTS.index(name) for name in ("shank_l", "foot_l")]
-    error, before = (np.abs(one.errors[rows, 0]).sum() for one in (own, adults))
+    error, before = (np.abs(result.errors[rows, 0]).sum() for result in (declared, adults))
     assert error < before
-    assert own.moments_nm < adults.moments_before_nm
+    assert declared.moments_nm < adults.moments_before_nm

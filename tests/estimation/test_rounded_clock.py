@@ -71,9 +71,9 @@ def test_the_same_frames_and_findings(recording_of, name):
     recording = recording_of(*SEVERAL[name])
     marker_set = marker_set_for(recording.markers.labels)
 
-    def found(one):
-        check = check_recording(one, marker_set)
-        return np.flatnonzero(check.context.trial.measured).tolist(), [placed(each) for each in check.findings]
+    def found(checked):
+        check = check_recording(checked, marker_set)
+        return np.flatnonzero(check.context.trial.measured).tolist(), [placed(finding) for finding in check.findings]
 
     as_read = found(recording)
     assert len(as_read[0]) > 20
@@ -87,12 +87,12 @@ def test_the_same_estimate(file_of, recording_of, name):
     model_file, *files = OF_MODELS[name]
     model, walk = read_osim(file_of(model_file)), recording_of(*files)
     first, *others = (
-        estimate_bsp(Subject(mass_kg=MASS_KG[name]), model, [TrialInput(one)])
-        for one in (walk, later(walk, 5.0), later(walk, 10.0))
+        estimate_bsp(Subject(mass_kg=MASS_KG[name]), model, [TrialInput(recording)])
+        for recording in (walk, later(walk, 5.0), later(walk, 10.0))
     )
     loads, sd = first.trials[0].joint_loads["estimate"], first.trials[0].deviations.moments
     for other in others:
         change = (other.trials[0].joint_loads["estimate"] - loads) / np.maximum(sd, 1e-6)
         # rounding turns into this much where the search ends, and in single precision
         assert np.abs(change).max() < 1e-3
-        assert [placed(one) for one in other.findings] == [placed(one) for one in first.findings]
+        assert [placed(finding) for finding in other.findings] == [placed(finding) for finding in first.findings]

@@ -11,7 +11,7 @@ from validation.measured_data import find
 from validation.usual_build import FILE, HEADER, fitted, read_people, stadium_mass_kg, stature_m, written
 
 pytest.importorskip("yeadon", reason="needs yeadon (pip install -e '.[test]')")
-NAMES = [one.name for one in measures()]
+NAMES = [measure.name for measure in measures()]
 SAMPLES = "yeadon/samplemeasurements"
 """Folder of the package's five people among the measured data."""
 
@@ -54,7 +54,9 @@ def test_slips_of_the_pen_count_as_not_measured():
     wrong = measures_m.copy()
     width = NAMES.index("trunk_rib_width")
     wrong[2, width] *= 2.0
-    sound, slipped = (fitted(one, np.array([size[0] for size in SIZES.values()])) for one in (measures_m, wrong))
+    sound, slipped = (
+        fitted(sizes_m, np.array([size[0] for size in SIZES.values()])) for sizes_m in (measures_m, wrong)
+    )
     others = np.delete(np.arange(len(NAMES)), width)
     np.testing.assert_array_equal(slipped.log_shape[others], sound.log_shape[others])
     assert slipped.log_shape[width] == pytest.approx(sound.log_shape[width], abs=0.05), "and not 0.14 more"
@@ -64,9 +66,9 @@ def test_the_figures_are_of_a_correlation():
     usual = usual_build()
     np.testing.assert_allclose(np.square(usual.common).sum(axis=1), 1.0, atol=1e-7)
     assert np.all((usual.log_sd > 0.01) & (usual.log_sd < 0.5))
-    own = fitted(*synthetic_people())
-    assert own.common.shape == usual.common.shape
-    np.testing.assert_allclose(np.square(own.common).sum(axis=1), 1.0)
+    refitted = fitted(*synthetic_people())
+    assert refitted.common.shape == usual.common.shape
+    np.testing.assert_allclose(np.square(refitted.common).sum(axis=1), 1.0)
 
 
 def test_the_file_is_what_is_written_of_its_figures():
@@ -94,12 +96,12 @@ def test_people_are_expected_from_the_four_others_within_the_deviations(monkeypa
             rest = fitted(np.delete(people, k, axis=0), np.delete(masses, k))
             monkeypatch.setattr(body_measures, "usual_build", lambda rest=rest: rest)
             body_measures._shape_and_spread.cache_clear()
-            own = body_measures._predicted(person, 0.08)
+            predicted = body_measures._predicted(person, 0.08)
             lengths = {name: person[NAMES.index(name)] for name in ("leg_knee_length", "leg_ankle_length")}
-            made = {one.name: (person[j], one.sd_m) for j, one in enumerate(measures()) if one.first}
+            made = {measure.name: (person[j], measure.sd_m) for j, measure in enumerate(measures()) if measure.first}
             (height_m,) = stature_m(person[None])
             body = measured_body(made, lengths, 0.08, stadium_mass_kg(person), height_m)
-            away.append((body.values - own).ravel() / np.sqrt(np.diag(body.covariance)))
+            away.append((body.values - predicted).ravel() / np.sqrt(np.diag(body.covariance)))
     finally:
         body_measures._shape_and_spread.cache_clear()
     assert np.mean(np.abs(away) < 1.96) > 0.95

@@ -30,16 +30,16 @@ ZERO = finding(
 
 
 @given(PLACES, PLACES)
-def test_overlap_is_mutual(one, other):
-    assert one.overlaps(one)
-    assert one.overlaps(Where())
-    assert one.overlaps(other) == other.overlaps(one)
+def test_overlap_is_mutual(where, other):
+    assert where.overlaps(where)
+    assert where.overlaps(Where())
+    assert where.overlaps(other) == other.overlaps(where)
 
 
 @given(PLACES, PLACES, st.sampled_from(["trial", "plate", "axis", "markers", "part", "span_s"]))
-def test_what_is_stated_less_overlaps_no_less(one, other, name):
-    if one.overlaps(other):
-        assert replace(one, **{name: getattr(Where(), name)}).overlaps(other)
+def test_what_is_stated_less_overlaps_no_less(where, other, name):
+    if where.overlaps(other):
+        assert replace(where, **{name: getattr(Where(), name)}).overlaps(other)
 
 
 @given(PLACES, st.sampled_from([("trial", "jump"), ("plate", "plate 3"), ("axis", "mediolateral"), ("part", "hand")]))

@@ -37,16 +37,18 @@ def example(name: str, style: str) -> Quantity:
     return Quantity(0.123 if "%" in style else 3.0, "1") if style or name.endswith("_sd") else Quantity(f"<{name}>")
 
 
-def said(one: Rule) -> str:
+def said(rule: Rule) -> str:
     """Its message with example values."""
-    styles = dict(re.findall(r"\{(\w+):?([^}]*)\}", one.message))
+    styles = dict(re.findall(r"\{(\w+):?([^}]*)\}", rule.message))
     known = {name for name in styles if "{" not in filled("{" + name + "}", PLACE, {})}
-    return filled(one.message, PLACE, {name: example(name, styles[name]) for name in styles.keys() - known})
+    return filled(rule.message, PLACE, {name: example(name, styles[name]) for name in styles.keys() - known})
 
 
 def written() -> str:
     """The file: code and message with example values, and below it the template."""
-    return "".join(f"{code} {one.severity} {said(one)}\n     {one.message}\n" for code, one in all_rules().items())
+    return "".join(
+        f"{code} {entry.severity} {said(entry)}\n     {entry.message}\n" for code, entry in all_rules().items()
+    )
 
 
 def test_messages_are_those_that_were_meant():
@@ -54,7 +56,7 @@ def test_messages_are_those_that_were_meant():
 
 
 def test_nothing_is_left_in_braces():
-    assert [code for code, one in all_rules().items() if "{" in said(one)] == []
+    assert [code for code, entry in all_rules().items() if "{" in said(entry)] == []
 
 
 if __name__ == "__main__":

@@ -38,7 +38,10 @@ def test_the_line_counts():
 
 def test_the_line_counts_what_is_overruled():
     """Of a recording with an ignored warning it was said that nothing was found."""
-    ignored = (*(replace(one, status="ignored") for one in FROZEN), replace(DELAY.muted("P243"), status="ignored"))
+    ignored = (
+        *(replace(frozen, status="ignored") for frozen in FROZEN),
+        replace(DELAY.muted("P243"), status="ignored"),
+    )
     assert Overview(ignored, 61, 1).line == "Use. Three findings were ignored; the trial was used."
     waived = replace(SPIKES, status="waived")
     assert (
@@ -48,7 +51,7 @@ def test_the_line_counts_what_is_overruled():
 
 
 def test_the_worst_comes_first():
-    assert [one.code for one in Overview((DELAY, *FROZEN, SPIKES), 1, 1).open] == [
+    assert [reported.code for reported in Overview((DELAY, *FROZEN, SPIKES), 1, 1).open] == [
         "M111",
         "M113",
         "M113",

@@ -14,11 +14,11 @@ KG = Quantity(46.123456, "kg")
 
 def proposed(code, where=None, severity=None, windows=WINDOWS, **evidence):
     found = [with_evidence(code, where or Where(), evidence, severity)]
-    return [one for one in remedies(found, windows) if not one.overrules]
+    return [remedy for remedy in remedies(found, windows) if not remedy.overrules]
 
 
 def test_every_setting_of_the_catalogue_is_one_of_the_subject_file():
-    named = {name.partition(" = ")[0] for one in all_rules().values() for name in one.settings}
+    named = {name.partition(" = ")[0] for entry in all_rules().values() for name in entry.settings}
     assert {"trial", "trial.window_s", "trial.leave_out", "subject.mass_kg", "model.static"} <= named
     for name in named:
         table, _, key = name.partition(".")
@@ -70,7 +70,7 @@ def test_what_can_be_overruled_is_last():
     assert last.text == 'ignore = ["P276"] under [trial.diagnostics] of walk'
     *_, last = remedies([finding("P244", Where(trial="walk"))], WINDOWS)
     assert (last.key, last.value) == ("waive", "P244")
-    assert [one.key for one in remedies([finding("S206", Where(trial="static"))], WINDOWS)] == ["static"], "hard"
+    assert [remedy.key for remedy in remedies([finding("S206", Where(trial="static"))], WINDOWS)] == ["static"], "hard"
     assert remedies([finding("R111", Where(trial="walk"))], WINDOWS) == (), "an INFO counts for nothing"
 
 

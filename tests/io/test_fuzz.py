@@ -127,7 +127,7 @@ def test_file_names_that_are_not_utf8(small):
 @pytest.mark.parametrize("name", [name for name in fuzz.READERS if name != "table.mot"])
 def test_fault_free_files_have_neither_errors_nor_warnings(small, name):
     found = getattr(fuzz.READERS[name](small / name), "findings", ())
-    assert [one.code for one in found if one.severity >= Severity.WARNING] == []
+    assert [finding.code for finding in found if finding.severity >= Severity.WARNING] == []
 
 
 def test_c3d_file_that_needs_a_process_of_its_own(small):

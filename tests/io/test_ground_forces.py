@@ -155,8 +155,8 @@ def test_a_spike_is_bridged(write):
     group = column_group(FORCE, POINT, TORQUE, STEMS["ground_force_vx"][:3])
     sound, _ = read_forces(write(group))
     spiked, _ = read_forces(write(group, ground_force_vy=(50, FORCE[1] - 1500.0)))
-    ((one,),) = spiked.spikes
-    assert (one.axis, one.size_n) == (1, pytest.approx(-1500.0))
+    ((spike,),) = spiked.spikes
+    assert (spike.axis, spike.size_n) == (1, pytest.approx(-1500.0))
     np.testing.assert_allclose(spiked.force, sound.force)
     np.testing.assert_allclose(spiked.moment, sound.moment, atol=1e-9)
 
@@ -270,10 +270,10 @@ CROSSED = {
 
 @pytest.mark.parametrize("case", CROSSED)
 def test_identifiers_of_another_load(write, write_xml, case):
-    replace, code, (one, other, identifier) = CROSSED[case]
+    replace, code, (owner, other, identifier) = CROSSED[case]
     force_file = write(named("A"), named("B"))
     assert plates_of(force_file, write_xml("A", "B")).names == ("A", "B")
-    both = {"other": one, "load": other} if code == "F144" else {"load": one, "owner": other, "what": "torque"}
+    both = {"other": owner, "load": other} if code == "F144" else {"load": owner, "owner": other, "what": "torque"}
     with refused(code, None, identifier=identifier, **both) as caught:
         plates_of(force_file, write_xml("A", "B", replace=replace))
     assert caught.value.path.name == "loads.xml"

@@ -81,14 +81,14 @@ def test_labels_without_meaning_still_show_the_legs(tmp_path, height_m):
     draft, text = drafted(tmp_path, static)
     by_name, _ = drafted(tmp_path, recording(positions))
     for landmark in LEGS | {"knee_medial_r", "knee_medial_l", "ankle_medial_r", "ankle_medial_l"}:
-        assert {names[one] for one in by_name.landmarks[landmark]} == set(draft.landmarks[landmark]), landmark
+        assert {names[label] for label in by_name.landmarks[landmark]} == set(draft.landmarks[landmark]), landmark
     assert "by its place alone" in text
     assert '# elbow_lateral_r = ""  # FILL IN' in text
 
 
 def test_without_arms_and_head_a_draft_makes_a_model(tmp_path):
     gone = ("Elbow", "Wrist", "Bicep", "Acrom", "Temple", "Head", "Sternum")
-    positions = {name: at for name, at in standing_positions().items() if not any(one in name for one in gone)}
+    positions = {name: at for name, at in standing_positions().items() if not any(part in name for part in gone)}
     draft, text = drafted(tmp_path, recording(positions))
     assert set(draft.landmarks) >= LEGS
     assert '# acromion_r = ""  # FILL IN' in text
@@ -140,7 +140,7 @@ def test_computed_points_are_in_no_segment_and_listed(tmp_path, hidden):
     assert not placed & added
     for label in added:
         assert f"#   {label}: " in text
-    assert {label for own in draft.landmarks.values() for label in own} & added == set()
+    assert {label for landmark in draft.landmarks.values() for label in landmark} & added == set()
 
 
 def test_the_lumbar_spine_is_in_no_segment(tmp_path):

@@ -73,7 +73,12 @@ def test_a_preset_is_recognised_by_its_legs(name, trunk):
     """Plug-in Gait's legs have a preset of their own."""
     preset = read_marker_set(name)
     parts = ("pelvis", "thigh", "shank", "foot", *(["torso"] if trunk else []))
-    legs = [label for segment, own in preset.segments.items() if segment.startswith(parts) for label in own]
+    legs = [
+        label
+        for segment, labels_of_segment in preset.segments.items()
+        if segment.startswith(parts)
+        for label in labels_of_segment
+    ]
     expected = "plug-in-gait-lower-body" if name == "plug-in-gait" and not trunk else name
     assert choose_marker_set(legs) == read_marker_set(expected)
     with pytest.raises(MarkerSetError):
@@ -97,8 +102,10 @@ def test_a_preset_is_recognised_in_other_capitals_and_punctuation(name):
     preset = read_marker_set(name)
     written = {label: label.replace("_", ".").swapcase() for label in preset.labels}
     chosen = choose_marker_set(list(written.values()))
-    assert chosen.landmarks == {key: tuple(written[one] for one in own) for key, own in preset.landmarks.items()}
-    assert chosen.segments == {key: tuple(written[one] for one in own) for key, own in preset.segments.items()}
+    assert chosen.landmarks == {
+        key: tuple(written[label] for label in entry) for key, entry in preset.landmarks.items()
+    }
+    assert chosen.segments == {key: tuple(written[label] for label in entry) for key, entry in preset.segments.items()}
     assert chosen.widths == preset.widths
     assert chosen.name == preset.name
     assert chosen.respelled == {label: spelled for label, spelled in written.items() if label != spelled}

@@ -72,7 +72,7 @@ def test_somebody_upright_along_z_in_a_trc_file_is_turned_and_the_forces_with_th
         table = pd.DataFrame(values, index=np.arange(1001) / 1000, columns=names)
         write_sto(tmp_path / folder / "walk.mot", table, in_degrees=False, name="grf")
     ground, lab = (
-        read_recording(tmp_path / one / "walk.trc", tmp_path / one / "walk.mot") for one in ("ground", "lab")
+        read_recording(tmp_path / part / "walk.trc", tmp_path / part / "walk.mot") for part in ("ground", "lab")
     )
     np.testing.assert_allclose(lab.markers.positions, ground.markers.positions, atol=1e-8)
     np.testing.assert_allclose(lab.plates.force, ground.plates.force)
@@ -128,7 +128,7 @@ def test_forces_of_a_force_file_go_before_those_of_the_c3d_file(files, c3d_lab):
     assert recording.plates.names == ("ground_force",)
     assert recording.mass_kg == pytest.approx(72.6)
     assert only(recording.findings, "F158").where.file == "walk.c3d"
-    assert [one for one in recording.findings if one.where.plate is not None] == []
+    assert [reported for reported in recording.findings if reported.where.plate is not None] == []
 
 
 def test_loads_file_alone_names_its_forces(file_of):
@@ -191,4 +191,4 @@ def test_notes_are_what_was_assumed_and_corrected(files):
     recording = replace(read_recording(files / "walk.trc"), findings=(whole, lost))
     assert [note.startswith("walk.c3d: ") for note in recording.notes] == [True]
     assert len(recording.left_out) == 1
-    assert [one.where.plate for one in with_plates_of_trial(recording).findings] == [None, "plate 1 (walk)"]
+    assert [reported.where.plate for reported in with_plates_of_trial(recording).findings] == [None, "plate 1 (walk)"]

@@ -182,8 +182,8 @@ def test_an_ankle_without_medial_marker_and_width_follows_the_foot(turned_deg):
     rotation = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
     for label in ("Ankle.Lat", "Heel", "Toe.Lat", "Toe.Med", "Toe.Tip"):
         positions[f"R.{label}"] = true + rotation @ (positions[f"R.{label}"] - true)
-    own = {label: at for label, at in positions.items() if "Ankle.Med" not in label}
-    marks = replace(jc.find_landmarks(recording(own), read_marker_set("cleveland-clinic")), stature_m=1.75)
+    without_medial = {label: at for label, at in positions.items() if "Ankle.Med" not in label}
+    marks = replace(jc.find_landmarks(recording(without_medial), read_marker_set("cleveland-clinic")), stature_m=1.75)
     knee_at = (marks["knee_lateral_r"] + marks["knee_medial_r"]) / 2
     shank = jc.frame(knee_at - marks["ankle_lateral_r"], np.array([0.0, 0.0, 1.0]))
     centre, axis = jc.ankle(marks, knee_at, shank, "r")

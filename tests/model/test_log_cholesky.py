@@ -52,8 +52,8 @@ def test_table_jacobian_agrees_with_finite_differences(seed):
     numeric = differences(lambda x: from_log_cholesky(SEGMENTS, x).table().ravel(), theta)
     analytic = table_jacobian(theta)
     for i in range(2):
-        own = slice(10 * i, 10 * i + 10)
-        np.testing.assert_allclose(analytic[i], numeric[own, own], atol=1e-8)
+        block = slice(10 * i, 10 * i + 10)
+        np.testing.assert_allclose(analytic[i], numeric[block, block], atol=1e-8)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -62,8 +62,8 @@ def test_dynamic_jacobian_agrees_with_finite_differences(seed):
     numeric = differences(lambda x: from_log_cholesky(SEGMENTS, x).dynamic_parameters(), theta)
     analytic = dynamic_jacobian(theta)
     for i in range(2):
-        own = slice(10 * i, 10 * i + 10)
-        np.testing.assert_allclose(analytic[i], numeric[own, own], atol=1e-8)
+        block = slice(10 * i, 10 * i + 10)
+        np.testing.assert_allclose(analytic[i], numeric[block, block], atol=1e-8)
 
 
 @given(arrays(float, 20, elements=st.floats(-4.0, 4.0)))

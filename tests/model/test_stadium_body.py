@@ -61,7 +61,7 @@ def test_pelvis_and_torso_are_the_packages_trunk_wherever_it_is_cut(name):
     for cut_m in (0.03, CUT_M, 0.1234, human.meas["Ls2L"]):
         bsp = stadium_bsp(own_person(name), cut_m)
         parts = [in_package_axes(bsp, kind) for kind in ("pelvis", "torso")]
-        masses, centres, tensors = (np.array(each) for each in zip(*parts, strict=True))
+        masses, centres, tensors = (np.array(column) for column in zip(*parts, strict=True))
         centres[1, 2] += cut_m
         whole = combine(masses, centres, tensors)
         assert whole[0] == pytest.approx(mass, abs=1e-9)
@@ -90,7 +90,7 @@ def test_a_body_that_cannot_be_is_refused():
         stadium_bsp(own_person("Dan"), 0.9)
     assert (caught.value.finding.code, caught.value.finding.evidence["value_m"].value) == ("S403", 0.9)
     shuffled = own_person("Dan").copy()
-    shuffled[[one.name for one in measures()].index("leg_calf_length")] = 0.2
+    shuffled[[measure.name for measure in measures()].index("leg_calf_length")] = 0.2
     with pytest.raises(PriorError) as caught:
         stadium_bsp(shuffled, CUT_M)
     assert caught.value.finding.code == "S403"

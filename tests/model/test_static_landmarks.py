@@ -39,8 +39,8 @@ def found(positions, marker_set=CLINIC):
 def test_a_knee_axis_beyond_its_limit_is_found(off_deg, parts, sense):
     angle = sense * (np.degrees(KNEE.within) + off_deg)
     departed = found(rotated_about(standing_positions(), "R.Knee.Lat", "R.Knee.Med", angle))
-    assert [one.part for one in departed] == parts
-    assert all(np.degrees(abs(one.angle_rad)) == pytest.approx(abs(angle), abs=0.1) for one in departed)
+    assert [departure.part for departure in departed] == parts
+    assert all(np.degrees(abs(departure.angle_rad)) == pytest.approx(abs(angle), abs=0.1) for departure in departed)
 
 
 def test_axes_that_differ_between_the_sides_are_found():
@@ -49,13 +49,13 @@ def test_axes_that_differ_between_the_sides_are_found():
         positions = standing_positions()
         for side in "RL":
             positions = rotated_about(positions, f"{side}.Knee.Lat", f"{side}.Knee.Med", half + off_deg)
-        assert [one.part for one in found(positions)] == parts
+        assert [departure.part for departure in found(positions)] == parts
 
 
 def test_an_ankle_axis_is_judged_by_the_foot():
     angle = np.degrees(ANKLE.within + ANKLE.centre) + 15.0
     departed = found(rotated_about(standing_positions(), "L.Ankle.Lat", "L.Ankle.Med", -angle))
-    assert [(one.part, one.limit.name) for one in departed] == [("ankle_l", "ankle axis")]
+    assert [(departure.part, departure.limit.name) for departure in departed] == [("ankle_l", "ankle axis")]
 
 
 def feet_turned(angle_deg):
@@ -63,7 +63,7 @@ def feet_turned(angle_deg):
     positions = standing_positions()
     for toe in [label for label in positions if label.startswith("R.Toe")]:
         positions = rotated_about(positions, "R.Heel", toe, -angle_deg)
-    return [one for one in found(positions) if one.part == "foot_r"]
+    return [departure for departure in found(positions) if departure.part == "foot_r"]
 
 
 @pytest.mark.parametrize(("limit_deg", "inside", "beyond"), [(53.0, -1.0, 1.0), (-37.0, 1.0, -1.0)])
@@ -80,23 +80,25 @@ def plug_in(wand_ahead_m, shank_wand_m=(0.0, 0.12, 0.03)):
     lateral malleolus forwards, up and outwards.
     """
     positions = standing_positions(HEIGHT_M)
-    own = {side + name: positions[f"{side}.{ours}"] for ours, name in INTO_PLUG_IN.items() for side in "RL"}
+    plug_in_positions = {
+        side + name: positions[f"{side}.{ours}"] for ours, name in INTO_PLUG_IN.items() for side in "RL"
+    }
     for side, sign in (("R", 1.0), ("L", -1.0)):
-        own[f"{side}PSI"] = HEIGHT_M * np.array([-0.065, 0.57, sign * 0.03])
-        own[f"{side}THI"] = positions[f"{side}.Knee.Lat"] + [wand_ahead_m, 0.15, sign * 0.03]
-        own[f"{side}TIB"] = positions[f"{side}.Ankle.Lat"] + np.multiply(shank_wand_m, [1.0, 1.0, sign])
-    static = replace(recording(own), measurements=WIDTHS_M)
+        plug_in_positions[f"{side}PSI"] = HEIGHT_M * np.array([-0.065, 0.57, sign * 0.03])
+        plug_in_positions[f"{side}THI"] = positions[f"{side}.Knee.Lat"] + [wand_ahead_m, 0.15, sign * 0.03]
+        plug_in_positions[f"{side}TIB"] = positions[f"{side}.Ankle.Lat"] + np.multiply(shank_wand_m, [1.0, 1.0, sign])
+    static = replace(recording(plug_in_positions), measurements=WIDTHS_M)
     return RecordingContext(static, PLUG_IN, is_static=True, height_m=HEIGHT_M)
 
 
 def test_a_wand_on_the_front_of_the_thigh_is_not_used():
     context = plug_in(0.08)
-    wands = [one for one in landmarks(context) if one.code == "L108"]
-    assert [(one.where.part, one.severity) for one in wands] == [
+    wands = [finding for finding in landmarks(context) if finding.code == "L108"]
+    assert [(finding.where.part, finding.severity) for finding in wands] == [
         ("right knee", Severity.WARNING),
         ("left knee", Severity.WARNING),
     ]
-    assert all(one.evidence["direction"].value == "inwards" for one in wands)
+    assert all(finding.evidence["direction"].value == "inwards" for finding in wands)
     marks = jc.find_landmarks(context.recording, PLUG_IN)
     pelvis, origin, width, depth = jc.pelvis_frame(marks)
     for side in "rl":
@@ -110,8 +112,8 @@ def test_a_wand_on_the_front_of_the_thigh_is_not_used():
 def test_a_shank_wand_in_front_of_the_shin_is_not_used():
     """It placed an ankle on the outer side of its lateral malleolus: a moment 0.4 N m/kg too large, without a word."""
     context = plug_in(0.0, (0.06, 0.12, -0.05))
-    wands = [one for one in landmarks(context) if one.code == "L108"]
-    assert [one.where.part for one in wands] == ["right ankle", "left ankle"]
+    wands = [finding for finding in landmarks(context) if finding.code == "L108"]
+    assert [finding.where.part for finding in wands] == ["right ankle", "left ankle"]
     marks = jc.find_landmarks(context.recording, PLUG_IN)
     pelvis, origin, width, depth = jc.pelvis_frame(marks)
     for side, sign in (("r", 1.0), ("l", -1.0)):
@@ -129,8 +131,8 @@ def test_a_wand_nearly_in_the_plane_is_used():
 def test_a_static_trial_with_an_impossible_knee_is_reported():
     positions = rotated_about(standing_positions(), "R.Knee.Lat", "R.Knee.Med", 50.0)
     context = RecordingContext(recording(positions), CLINIC, is_static=True, height_m=HEIGHT_M)
-    one = only(list(landmarks(context)), "S209", angle_rad=np.radians(50.0), axis="knee axis")
-    assert one.where.part == "right knee"
+    finding = only(list(landmarks(context)), "S209", angle_rad=np.radians(50.0), axis="knee axis")
+    assert finding.where.part == "right knee"
 
 
 def test_a_draft_that_cannot_be_right_says_so():

@@ -66,6 +66,6 @@ def test_vicon_puts_the_knee_marker_into_the_corner(file_of, name):
     modelled = recording.markers.select(["LKNE", "RKNE"])
     assert "F166" in codes(recording.findings)
     others = [label for label in recording.markers.labels if label not in modelled.labels]
-    own = with_knees_of_device(Recording("static", recording.markers.select(others)), name).markers
-    off = np.linalg.norm(own.select(["LKNE", "RKNE"]).positions - modelled.positions, axis=2)
+    placed = with_knees_of_device(Recording("static", recording.markers.select(others)), name).markers
+    off = np.linalg.norm(placed.select(["LKNE", "RKNE"]).positions - modelled.positions, axis=2)
     assert np.nanmax(off) < 0.002

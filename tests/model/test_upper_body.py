@@ -67,8 +67,8 @@ def test_an_arm_without_an_elbow_has_it_between_shoulder_and_wrist():
 
 def test_one_marker_stands_for_a_wrist():
     whole, _ = right_arm()
-    one, _ = right_arm("R.Wrist.Med")
-    assert np.linalg.norm(one.wrist - whole.wrist) == pytest.approx(
+    by_marker, _ = right_arm("R.Wrist.Med")
+    assert np.linalg.norm(by_marker.wrist - whole.wrist) == pytest.approx(
         0.5 * HEIGHT_M * np.hypot(0.01, np.hypot(0.005, 0.035))
     )
 
@@ -93,7 +93,9 @@ ASSUMED = {
 @pytest.mark.parametrize(("gone", "expected"), ASSUMED.items())
 def test_what_is_assumed_in_place_of_each_landmark(gone, expected):
     """Nothing of an arm without any marker: the motion shows it no more than the static trial."""
-    assert [(one.part, one.lacking, one.of_leg) for one in assumptions(marks(*gone))] == expected
+    assert [
+        (assumption.part, assumption.lacking, assumption.of_leg) for assumption in assumptions(marks(*gone))
+    ] == expected
 
 
 def test_a_width_of_one_side_stands_for_both():
@@ -103,8 +105,12 @@ def test_a_width_of_one_side_stands_for_both():
     found = find_landmarks(recording(standing_positions()), plug_in)
     known = type(found)({}, points, {"knee_r": 0.1, "ankle_r": 0.07, "ankle_l": 0.07}, plug_in)
     assert known.width("knee_l") == 0.1
-    (one,) = assumptions(known)
-    assert (one.part, one.lacking, one.instead) == ("knee_l", ("knee_l_width",), "that of the right knee is used")
+    (assumption,) = assumptions(known)
+    assert (assumption.part, assumption.lacking, assumption.instead) == (
+        "knee_l",
+        ("knee_l_width",),
+        "that of the right knee is used",
+    )
 
 
 ACROMIA = ("R.Acromium", "L.Acromium")

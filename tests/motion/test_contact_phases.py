@@ -17,32 +17,39 @@ def test_only_stances_on_plates_that_are_part_of_no_stride(fit):
     (trial,) = fit.trials
     phases, strides = trial.phases, trial.strides
     assert phases
-    assert {one.phase for one in phases} == {"stance"}
-    for one in phases:
-        assert 0.4 < one.end_s - one.start_s < 1.0
-        assert one.toe_off_s == one.end_s
-        assert not [s for s in strides if s.side == one.side and abs(s.start_s - one.start_s) < 0.1]
+    assert {phase.phase for phase in phases} == {"stance"}
+    for phase in phases:
+        assert 0.4 < phase.end_s - phase.start_s < 1.0
+        assert phase.toe_off_s == phase.end_s
+        assert not [s for s in strides if s.side == phase.side and abs(s.start_s - phase.start_s) < 0.1]
     every = contact_phases(trial.skeleton, trial.kinematics, ())
     assert len(every) > len(phases), "without strides all stances are phases of their own"
 
 
 def test_the_other_foot_of_a_stance_has_the_times_of_its_events(fit):
     (trial,) = fit.trials
-    events = [one.event for one in found_events(trial.skeleton, trial.kinematics)]
-    for one in contact_phases(trial.skeleton, trial.kinematics, ()):
-        other = {"r": "l", "l": "r"}[one.side]
-        for time_s, kind in ((one.opposite_toe_off_s, "toe off"), (one.opposite_strike_s, "heel strike")):
+    events = [found_event.event for found_event in found_events(trial.skeleton, trial.kinematics)]
+    for contact_phase in contact_phases(trial.skeleton, trial.kinematics, ()):
+        other = {"r": "l", "l": "r"}[contact_phase.side]
+        for time_s, kind in (
+            (contact_phase.opposite_toe_off_s, "toe off"),
+            (contact_phase.opposite_strike_s, "heel strike"),
+        ):
             near = [event.time_s for event in events if event[1:] == (other, kind) and abs(event.time_s - time_s) < 0.1]
             assert time_s in near
 
 
 def test_no_phase_that_the_motion_does_not_cover(fit):
     (trial,) = fit.trials
-    one, spline = trial.phases[0], trial.kinematics.spline
-    shown = spline.time[spline.time < one.end_s - 0.05]
+    phase, spline = trial.phases[0], trial.kinematics.spline
+    shown = spline.time[spline.time < phase.end_s - 0.05]
     cut = replace(trial.kinematics, spline=replace(spline, time=shown))
     found = contact_phases(trial.skeleton, cut, trial.strides)
-    assert not [each for each in found if each.side == one.side and abs(each.start_s - one.start_s) < 0.1]
+    assert not [
+        other_phase
+        for other_phase in found
+        if other_phase.side == phase.side and abs(other_phase.start_s - phase.start_s) < 0.1
+    ]
 
 
 @pytest.mark.parametrize("missing", [{"task": "squat"}, {"on_ground": None}])
@@ -84,10 +91,10 @@ class _Falling:
 def test_a_landing_lasts_from_contact_until_the_pelvis_is_lowest(landing):
     skeleton, kinematics, first = landing
     found = contact_phases(skeleton, kinematics, ())
-    assert [(one.side, one.phase, one.number) for one in found] == [("r", "landing", 1), ("l", "landing", 1)]
-    for one in found:
-        assert one.start_s == pytest.approx(first, abs=0.02)
-        assert one.end_s == pytest.approx(first + 0.25, abs=0.03)
+    assert [(phase.side, phase.phase, phase.number) for phase in found] == [("r", "landing", 1), ("l", "landing", 1)]
+    for phase in found:
+        assert phase.start_s == pytest.approx(first, abs=0.02)
+        assert phase.end_s == pytest.approx(first + 0.25, abs=0.03)
 
 
 def test_a_step_onto_a_plate_is_no_landing(landing):
@@ -107,14 +114,14 @@ def test_curves_of_a_phase_are_those_over_time(fit):
     (trial,), curves = fit.trials, fit.contact_phases()
     assert list(curves.columns) == ["trial", "task", "phase", "side", "stride", "percent", "quantity", "value", "sd"]
     joints = trial.joint_curves.joints["estimate"]
-    for one in trial.phases:
-        own = curves[(curves.side == one.side) & (curves.stride == one.number)]
+    for phase in trial.phases:
+        of_phase = curves[(curves.side == phase.side) & (curves.stride == phase.number)]
         for axis, name in enumerate(component_names("knee")):
-            rows = own[own.quantity == f"{name}_joint_moment"]
+            rows = of_phase[of_phase.quantity == f"{name}_joint_moment"]
             known = rows.value.notna().to_numpy()
-            row = joints.joints.index(f"knee_{one.side}")
+            row = joints.joints.index(f"knee_{phase.side}")
             there = np.isfinite(joints.moments[:, row, axis])
-            expected = np.interp(one.time[known], trial.joint_curves.time[there], joints.moments[there, row, axis])
+            expected = np.interp(phase.time[known], trial.joint_curves.time[there], joints.moments[there, row, axis])
             scale = np.abs(expected).max() / fit.mass_kg
             np.testing.assert_allclose(rows.value[known], expected / fit.mass_kg, atol=0.05 * scale)
             assert (rows.sd[known] > 0.0).all()

@@ -63,9 +63,9 @@ def test_strides_run_from_contact_to_contact(walked, measured):
         assert stride.toe_off_s == off
         assert stride.opposite_toe_off_s < stride.opposite_strike_s < stride.toe_off_s < stride.end_s
     for side in FEET:
-        own = [stride for stride in strides if stride.side == side]
-        assert [stride.number for stride in own] == list(range(1, len(own) + 1))
-        assert all(a.end_s == b.start_s for a, b in pairwise(own))
+        of_side = [stride for stride in strides if stride.side == side]
+        assert [stride.number for stride in of_side] == list(range(1, len(of_side) + 1))
+        assert all(a.end_s == b.start_s for a, b in pairwise(of_side))
 
 
 def test_where_no_plate_sees_a_contact_the_motion_tells_it(walked, trial, measured):
@@ -100,8 +100,8 @@ def test_a_foot_without_markers_tells_no_events(walked, trial):
         measured=trial.markers.time < 1.5,
     )
     events = found_events(walked.skeleton, kinematics_of(walked, few))
-    assert max(one.event.time_s for one in events if one.event.side == "r") < 2.0 + 2 * FRAME
-    assert max(one.event.time_s for one in events if one.event.side == "l") > 3.0
+    assert max(event.event.time_s for event in events if event.event.side == "r") < 2.0 + 2 * FRAME
+    assert max(event.event.time_s for event in events if event.event.side == "l") > 3.0
 
 
 def test_one_who_squats_takes_no_strides(walked, trial):
@@ -130,29 +130,30 @@ def test_lengths_on_a_belt_that_speeds_up(walked, trial):
     strides = strides_of(walked.skeleton, kinematics)
     feet = feet_under_pelvis(walked.skeleton, kinematics)
     expected = [float(np.diff(np.interp([s.start_s, s.end_s], time, walked.motion.q[:, 0]))[0]) for s in strides]
-    stated = [one.stride_length_m for one in spatiotemporal(feet, strides, belt)]
+    stated = [of_stride.stride_length_m for of_stride in spatiotemporal(feet, strides, belt)]
     np.testing.assert_allclose(stated, expected, rtol=0.01)
-    by_feet = [one.stride_length_m for one in spatiotemporal(feet, strides)]
+    by_feet = [of_stride.stride_length_m for of_stride in spatiotemporal(feet, strides)]
     assert np.abs(np.array(by_feet) / expected - 1).max() > 0.03
 
 
 def test_lengths_on_two_belts(walked, measured, monkeypatch):
     """Each stride is as long as over ground, whether the speeds are stated or told by each foot."""
     strides, feet = strides_of(walked.skeleton, measured), feet_under_pelvis(walked.skeleton, measured)
-    expected = [one.stride_length_m for one in spatiotemporal(feet, strides)]
+    expected = [of_stride.stride_length_m for of_stride in spatiotemporal(feet, strides)]
     speeds = (1.4, 0.7)
     under = {side: speed * feet.time[:, None] * [1.0, 0.0, 0.0] for side, speed in zip(FEET, speeds, strict=True)}
     heel, toe = ({side: points[side] - under[side] for side in FEET} for points in (feet.heel, feet.toe))
     slid = replace(feet, heel=heel, toe=toe)
     with monkeypatch.context() as patched:  # this walker's standing feet slide, which cannot be told from a belt
         patched.setattr("kinertia.motion.spatiotemporal._BELT_M_S", 0.0)
-        sliding = [one.stride_length_m for one in spatiotemporal(feet, strides)]
+        sliding = [of_stride.stride_length_m for of_stride in spatiotemporal(feet, strides)]
     np.testing.assert_allclose(sliding, expected, rtol=0.05)
     for belt, lengths in ((None, sliding), (Belt(np.zeros(1), np.array([speeds])), expected)):
-        found = [one.stride_length_m for one in spatiotemporal(slid, strides, belt)]
+        found = [of_stride.stride_length_m for of_stride in spatiotemporal(slid, strides, belt)]
         np.testing.assert_allclose(found, lengths, rtol=0.001)
     exchanged = [
-        one.stride_length_m for one in spatiotemporal(slid, strides, Belt(np.zeros(1), np.array([speeds[::-1]])))
+        of_stride.stride_length_m
+        for of_stride in spatiotemporal(slid, strides, Belt(np.zeros(1), np.array([speeds[::-1]])))
     ]
     assert np.abs(np.array(exchanged) / expected - 1).min() > 0.3
 
@@ -184,8 +185,8 @@ def test_speed_on_a_belt_of_runners_whose_heels_rise_early(speed_m_s, stance, fl
         Stride("r", 1, 0.0, stride_s, stance * stride_s, np.nan, half, False),
         Stride("l", 1, half, half + stride_s, np.nan, np.nan, stride_s, False),
     ][: 1 if stance < 0.5 else 2]
-    for one in spatiotemporal(feet, strides):
-        assert one.speed_m_s == pytest.approx(speed_m_s, rel=0.01)
+    for of_stride in spatiotemporal(feet, strides):
+        assert of_stride.speed_m_s == pytest.approx(speed_m_s, rel=0.01)
 
 
 @pytest.mark.parametrize("turned", [0.0, 30.0])
@@ -199,27 +200,27 @@ def test_lengths_and_speed_whatever_the_heading_and_on_a_belt(walked, trial, bel
     measures = spatiotemporal(feet_under_pelvis(walked.skeleton, kinematics), strides)
     assert len(measures) >= 4
     pelvis = walked.motion.q[:, 0]
-    for stride, one in zip(strides, measures, strict=True):
+    for stride, of_stride in zip(strides, measures, strict=True):
         start, end = np.interp([stride.start_s, stride.end_s], walked.time, pelvis)
         speed = (end - start) / (stride.end_s - stride.start_s)
         # this walker's standing toes slide by some cm/s, which on a belt cannot be told from the belt
-        assert one.speed_m_s == pytest.approx(speed, rel=0.03 if belt_m_s else 0.005)
-        assert one.stride_length_m == pytest.approx(one.speed_m_s * one.stride_time_s)
-        assert one.cadence_steps_min == pytest.approx(120 / one.stride_time_s)
-        assert 0.4 * one.stride_length_m < one.step_length_m < 0.6 * one.stride_length_m
-        assert 0.02 < one.step_width_m < 0.25
-    by_end = {stride.end_s: one for stride, one in zip(strides, measures, strict=True)}
+        assert of_stride.speed_m_s == pytest.approx(speed, rel=0.03 if belt_m_s else 0.005)
+        assert of_stride.stride_length_m == pytest.approx(of_stride.speed_m_s * of_stride.stride_time_s)
+        assert of_stride.cadence_steps_min == pytest.approx(120 / of_stride.stride_time_s)
+        assert 0.4 * of_stride.stride_length_m < of_stride.step_length_m < 0.6 * of_stride.stride_length_m
+        assert 0.02 < of_stride.step_width_m < 0.25
+    by_end = {stride.end_s: of_stride for stride, of_stride in zip(strides, measures, strict=True)}
     steps = [
-        (by_end[stride.opposite_strike_s].step_length_m + one.step_length_m, one.stride_length_m)
-        for stride, one in zip(strides, measures, strict=True)
+        (by_end[stride.opposite_strike_s].step_length_m + of_stride.step_length_m, of_stride.stride_length_m)
+        for stride, of_stride in zip(strides, measures, strict=True)
         if stride.opposite_strike_s in by_end
     ]
     assert len(steps) >= 2
     np.testing.assert_allclose(*zip(*steps, strict=True), rtol=0.005)
     for side in FEET:
-        own = [one for stride, one in zip(strides, measures, strict=True) if stride.side == side]
+        of_side = [of_stride for stride, of_stride in zip(strides, measures, strict=True) if stride.side == side]
         loaded = [(end - start) for start, end in contacts(walked, side)]
-        assert own[0].stance_percent == pytest.approx(100 * loaded[0] / own[0].stride_time_s, abs=1.5)
+        assert of_side[0].stance_percent == pytest.approx(100 * loaded[0] / of_side[0].stride_time_s, abs=1.5)
     both = (walked.foot_loads[:, :, 1] > LOAD_THRESHOLD_N).all(axis=1)
     first = strides[0]
     inside = (walked.time >= first.start_s) & (walked.time < first.end_s)
@@ -260,7 +261,7 @@ def test_a_file_tells_the_events_that_plates_do_not_see(walked, trial):
     given = strides_of(walked.skeleton, kinematics_of(walked, replace(half, events=stated(walked, delay_s=0.004))))
     assert len(given) >= len(without) > 2
     by_file, by_motion = (
-        [one for one in strides if min(abs(one.end_s - time - 0.004) for time in known) < 1e-9]
+        [stride for stride in strides if min(abs(stride.end_s - time - 0.004) for time in known) < 1e-9]
         for strides in (given, without)
     )
     assert len(by_file) >= 2
@@ -269,14 +270,14 @@ def test_a_file_tells_the_events_that_plates_do_not_see(walked, trial):
 
 
 def test_events_that_a_cropped_file_kept_from_outside_its_frames_begin_no_stride(walked, trial):
-    own = stated(walked)
-    strikes = {side: [one for one in own if (one.side, one.kind) == (side, "heel strike")] for side in FEET}
+    events = stated(walked)
+    strikes = {side: [event for event in events if (event.side, event.kind) == (side, "heel strike")] for side in FEET}
     first, second, *_ = max(strikes.values(), key=lambda of_side: of_side[0].time_s)
     before = replace(first, time_s=2.0 * first.time_s - second.time_s)
     after = replace(first, time_s=walked.time[-1] + 0.5)
     assert before.time_s < walked.time[0]
-    expected = strides_of(walked.skeleton, kinematics_of(walked, replace(trial, events=own)))
-    found = strides_of(walked.skeleton, kinematics_of(walked, replace(trial, events=(before, *own, after))))
+    expected = strides_of(walked.skeleton, kinematics_of(walked, replace(trial, events=events)))
+    found = strides_of(walked.skeleton, kinematics_of(walked, replace(trial, events=(before, *events, after))))
     assert found == expected
     assert min(stride.start_s for stride in found) >= walked.time[0]
 

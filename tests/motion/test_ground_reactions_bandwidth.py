@@ -20,7 +20,7 @@ def step(start_s, heel_strike_n=150.0):
 
 
 def steps(*starts_s):
-    return np.stack([step(one) for one in starts_s], axis=1)
+    return np.stack([step(start) for start in starts_s], axis=1)
 
 
 def low_passed(force, cutoff_hz):

@@ -65,7 +65,7 @@ def test_signs_of_a_force_beside_the_knee(walked):
     pose = skeleton.pose(still.q)
     weightless = replace(walked.bsp, mass_kg=1e-9 * walked.bsp.mass_kg)
     for foot, (side, medial) in enumerate((("r", -1.0), ("l", 1.0))):
-        joint = next(one for one in body_joints(skeleton) if one.label == f"knee_{side}")
+        joint = next(body_joint for body_joint in body_joints(skeleton) if body_joint.label == f"knee_{side}")
         force = np.array([0.0, 100.0, 0.0])
         ahead = np.add(joint.centre(skeleton, pose), [0.02, 0.0, 0.03 * medial])
         loads = np.zeros((n, 2, 6))
@@ -100,7 +100,7 @@ def test_the_roll_of_a_foot_does_not_change_the_rotation_moment_of_the_ankle():
     rng = np.random.default_rng(0)
     shank, foot = Rotation.random(2, rng=rng).as_matrix()
     rolled = foot @ Rotation.from_euler("X", 25.0, degrees=True).as_matrix()
-    axes = [joint_axes(shank[None], one[None], long_axis=0) for one in (foot, rolled)]
+    axes = [joint_axes(shank[None], foot_axes[None], long_axis=0) for foot_axes in (foot, rolled)]
     np.testing.assert_allclose(axes[0], axes[1], atol=1e-12)
     flexion, inversion, rotation = axes[0][0]
     np.testing.assert_allclose(np.cross(flexion, inversion) @ rotation, np.linalg.norm(np.cross(flexion, inversion)))
@@ -116,9 +116,9 @@ def test_virtual_axes_give_the_whole_load_and_change_nothing_else(walked):
     np.testing.assert_allclose(forces[:, virtual.former], expected, atol=1e-9)
     pose = skeleton.pose(walked.motion.q)
     wrenches = joint_wrenches(skeleton, walked.bsp, walked.motion, walked.foot_loads, joints)
-    for own, base, joint in zip(virtual.added, virtual.bases, joints, strict=True):
+    for virtual_axes, base, joint in zip(virtual.added, virtual.bases, joints, strict=True):
         axes = pose.rotation[:, base]
-        for part, rows in ((slice(0, 3), own[:3]), (slice(3, 6), own[3:])):
+        for part, rows in ((slice(0, 3), virtual_axes[:3]), (slice(3, 6), virtual_axes[3:])):
             expected = np.einsum("nka,nk->na", axes, wrenches[joint][:, part])
             np.testing.assert_allclose(forces[:, rows], expected, atol=1e-8, err_msg=joint.label)
 
@@ -128,7 +128,7 @@ def test_no_moments_of_legs_that_are_none(walked):
     skeleton = walked.skeleton
     shank = next(joint for joint in skeleton.joints if joint.child == "shank_r")
     turned = replace(shank, child_rotation=np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]))
-    other = replace(skeleton, joints=tuple(turned if one is shank else one for one in skeleton.joints))
+    other = replace(skeleton, joints=tuple(turned if joint is shank else joint for joint in skeleton.joints))
     assert [joint.label for joint in body_joints(other)] == ["lumbar"]
     lumbar = lumbar_joint(skeleton)
     assert lumbar is not None

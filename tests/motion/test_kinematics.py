@@ -90,7 +90,7 @@ def test_smoothed_coordinates_and_derivatives_are_near_the_truth(skeleton, trial
 def test_frames_at_the_limit_of_steps_are_counted(skeleton, trial, monkeypatch):
     monkeypatch.setattr("kinertia.motion.kinematics.solve_ik", partial(solve_ik, most_steps=1))
     kinematics = solve_kinematics(skeleton, trial, 0.0, 10.0)
-    (found,) = [one for one in kinematics.findings if one.code == "R105"]
+    (found,) = [finding for finding in kinematics.findings if finding.code == "R105"]
     assert found.evidence["frames"].value == (~kinematics.ik.converged).sum() > 0
 
 
@@ -187,12 +187,12 @@ def test_a_coordinate_seen_too_seldom_is_named(skeleton, trial):
 
 
 def test_a_single_frame_is_too_short(skeleton, trial):
-    one = replace(
+    single = replace(
         trial,
         markers=Markers(np.zeros(1), trial.markers.labels, trial.markers.positions[:1]),
         measured=np.ones(1, bool),
     )
-    found = refused(skeleton, one)
+    found = refused(skeleton, single)
     assert (found.code, found.evidence["frames"].value) == ("R102", 1)
 
 

@@ -26,11 +26,11 @@ def walked():
     )
 
 
-def of(walked, convention, motion=None):
+def outputs_by_name(walked, convention, motion=None):
     """Outputs by name."""
     moved = walked.motion if motion is None else motion
     found = model_outputs(walked.skeleton, walked.bsp, moved, walked.foot_loads, MASS_KG, convention, walked.deviations)
-    return {one.name: one for one in found}
+    return {output.name: output for output in found}
 
 
 def column(walked, values, name):
@@ -39,7 +39,7 @@ def column(walked, values, name):
 
 @pytest.mark.parametrize("side", ["R", "L"])
 def test_angles_of_the_hip_are_its_coordinates(walked, side):
-    outputs = of(walked, "plug-in-gait")
+    outputs = outputs_by_name(walked, "plug-in-gait")
     names = [f"hip_{turn}_{side.lower()}" for turn in ("flexion", "adduction", "rotation")]
     expected = np.degrees([column(walked, walked.motion.q, name) for name in names]).T
     np.testing.assert_allclose(outputs[f"{side}HipAngles"].values, expected, atol=1e-9)
@@ -51,7 +51,7 @@ def test_angles_of_the_hip_are_its_coordinates(walked, side):
 
 @pytest.mark.parametrize("side", ["R", "L"])
 def test_moments_along_the_joints_own_axes_are_generalised_moments(walked, side):
-    outputs = of(walked, "isb")
+    outputs = outputs_by_name(walked, "isb")
     loads = inverse_dynamics(walked.skeleton, walked.bsp, walked.motion, walked.foot_loads) / MASS_KG
     names = [f"hip_{turn}_{side.lower()}" for turn in ("flexion", "adduction", "rotation")]
     expected = np.stack([column(walked, loads, name) for name in names], axis=1)
@@ -64,11 +64,11 @@ def test_moments_along_the_joints_own_axes_are_generalised_moments(walked, side)
 
 def test_plug_in_gaits_moments_extend(walked):
     """Internal, positive where they extend, abduct and rotate externally, in the distal segment's axes."""
-    theirs, ours = of(walked, "plug-in-gait"), of(walked, "isb")
+    theirs, ours = outputs_by_name(walked, "plug-in-gait"), outputs_by_name(walked, "isb")
     for joint in ("Hip", "Knee", "Ankle"):
-        one, other = theirs[f"R{joint}Moment"].values[:, 0], ours[f"R{joint}Moment"].values[:, 0]
-        assert np.corrcoef(one, -1000.0 * other)[0, 1] > 0.97
-        assert abs(np.polyfit(other, one, 1)[0] + 1000.0) < 150.0
+        stated, other = theirs[f"R{joint}Moment"].values[:, 0], ours[f"R{joint}Moment"].values[:, 0]
+        assert np.corrcoef(stated, -1000.0 * other)[0, 1] > 0.97
+        assert abs(np.polyfit(other, stated, 1)[0] + 1000.0) < 150.0
         for name in (f"R{joint}Moment", f"L{joint}Moment"):
             total = np.linalg.norm(theirs[name].values, axis=1)
             wrench = next(
@@ -81,14 +81,14 @@ def test_plug_in_gaits_moments_extend(walked):
 
 def test_powers_are_those_of_the_coordinates(walked):
     loads = inverse_dynamics(walked.skeleton, walked.bsp, walked.motion, walked.foot_loads)
-    outputs = of(walked, "plug-in-gait")
+    outputs = outputs_by_name(walked, "plug-in-gait")
     for leg in leg_joints(walked.skeleton):
         columns = leg.columns(walked.skeleton)
-        one = outputs[f"{leg.side.upper()}{leg.name}Power"]
+        power = outputs[f"{leg.side.upper()}{leg.name}Power"]
         expected = (loads * walked.motion.qd)[:, columns].sum(axis=1) / MASS_KG
         tolerance = 0.03 if leg.name == "Ankle" else 1e-9  # the subtalar axis does not pass the ankle centre
-        np.testing.assert_allclose(one.values[:, 2], expected, atol=tolerance)
-        np.testing.assert_allclose(one.sd[:, 2], 14.0 / MASS_KG * np.sqrt(len(columns)), rtol=1e-9)
+        np.testing.assert_allclose(power.values[:, 2], expected, atol=tolerance)
+        np.testing.assert_allclose(power.sd[:, 2], 14.0 / MASS_KG * np.sqrt(len(columns)), rtol=1e-9)
 
 
 def test_errors_of_a_joints_axes_go_together_as_motions_by_chance_do(walked):
@@ -101,17 +101,17 @@ def test_errors_of_a_joints_axes_go_together_as_motions_by_chance_do(walked):
     frame = slice(30, 31)
     q = walked.motion.q[frame] + apart
     many = SimpleNamespace(**{**vars(walked), "foot_loads": np.zeros((count, 2, 6)), "deviations": None})
-    expected = of(many, "isb", Motion(q, 0 * q, 0 * q))["RAnkleAngles"].values.std(axis=0)
-    one = {name: np.repeat(getattr(walked.motion, name)[frame], 2, axis=0) for name in ("q", "qd", "qdd")}
-    spread = np.zeros(one["q"].shape)
+    expected = outputs_by_name(many, "isb", Motion(q, 0 * q, 0 * q))["RAnkleAngles"].values.std(axis=0)
+    pose = {name: np.repeat(getattr(walked.motion, name)[frame], 2, axis=0) for name in ("q", "qd", "qdd")}
+    spread = np.zeros(pose["q"].shape)
     spread[:, columns] = sd
     drawn = np.repeat(apart[:, None], 2, axis=1)
     deviations = SimpleNamespace(coordinates=spread, moments=spread, powers=spread)
 
     def stated(departures):
         loads = np.repeat(walked.foot_loads[frame], 2, axis=0)
-        told = walked.skeleton, walked.bsp, Motion(**one), loads, MASS_KG, "isb", deviations, departures
-        return {one.name: one.sd[0] for one in model_outputs(*told)}
+        told = walked.skeleton, walked.bsp, Motion(**pose), loads, MASS_KG, "isb", deviations, departures
+        return {model_output.name: model_output.sd[0] for model_output in model_outputs(*told)}
 
     joint, alone = stated(Departures(drawn, drawn, drawn)), stated(None)
     np.testing.assert_allclose(joint["RAnkleAngles"], expected, rtol=0.05)
@@ -132,7 +132,10 @@ def test_both_sides_have_the_same_signs(walked):
     still = Motion(q, np.zeros(q.shape), np.zeros(q.shape))
     few = SimpleNamespace(**{**vars(walked), "foot_loads": np.zeros((1, 2, 6)), "deviations": None})
     for convention in ("plug-in-gait", "isb"):
-        outputs, before = of(few, convention, still), of(few, convention, Motion(0 * q, 0 * q, 0 * q))
+        outputs, before = (
+            outputs_by_name(few, convention, still),
+            outputs_by_name(few, convention, Motion(0 * q, 0 * q, 0 * q)),
+        )
         for joint in ("Hip", "Knee", "Ankle", "FootProgress"):
             turned = [outputs[f"{side}{joint}Angles"].values - before[f"{side}{joint}Angles"].values for side in "RL"]
             np.testing.assert_allclose(*turned, atol=3.0)  # a person's legs are not quite mirror images

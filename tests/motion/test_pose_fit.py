@@ -20,9 +20,9 @@ def test_distances_within_segments_are_those_of_the_walk(recording_of, name):
     assert pose is not None
     assert len(pose.time) == 1
     for segment in ("thigh_r", "shank_r", "foot_r", "thigh_l", "shank_l", "foot_l", "pelvis"):
-        own = [label for label in marker_set.segments[segment] if label in markers.labels]
-        here, there = pose.select(own).positions, markers.select(own).positions
-        for k in range(1, len(own)):
+        labels = [label for label in marker_set.segments[segment] if label in markers.labels]
+        here, there = pose.select(labels).positions, markers.select(labels).positions
+        for k in range(1, len(labels)):
             usual = np.nanmedian(np.linalg.norm(there[:, k] - there[:, 0], axis=1))
             assert np.linalg.norm(here[0, k] - here[0, 0]) == pytest.approx(usual, abs=0.015)
 
@@ -44,6 +44,6 @@ def test_both_feet_are_flat_and_the_pelvis_is_one(recording_of):
 def test_no_pose_without_a_landmark_of_a_leg(recording_of):
     markers = recording_of("synthetic/walk.c3d").without_empty_markers().markers
     marker_set = marker_set_of(markers)
-    assert stance_pose(markers.select([one for one in markers.labels if one != "RKNE"]), marker_set) is None
-    hidden = np.where(np.array([one == "LASI" for one in markers.labels])[None, :, None], np.nan, markers.positions)
+    assert stance_pose(markers.select([label for label in markers.labels if label != "RKNE"]), marker_set) is None
+    hidden = np.where(np.array([label == "LASI" for label in markers.labels])[None, :, None], np.nan, markers.positions)
     assert stance_pose(Markers(markers.time, markers.labels, hidden), marker_set) is None

@@ -177,14 +177,14 @@ def test_gap_at_a_fixed_p_equals_fit_of_the_visible_samples():
 
 def test_single_column_has_scalar_attributes():
     time, _, y = noisy_sinusoids(columns=1)
-    one, many = smooth(time, y[:, 0], "gcv"), smooth(time, y, "gcv")
-    assert one.p.shape == one.cutoff_hz.shape == one.sigma.shape == ()
-    assert one(0.5).shape == ()
-    assert one(time[:7]).shape == (7,)
-    assert one(time[:6].reshape(2, 3)).shape == (2, 3)
+    single, many = smooth(time, y[:, 0], "gcv"), smooth(time, y, "gcv")
+    assert single.p.shape == single.cutoff_hz.shape == single.sigma.shape == ()
+    assert single(0.5).shape == ()
+    assert single(time[:7]).shape == (7,)
+    assert single(time[:6].reshape(2, 3)).shape == (2, 3)
     assert many(time[:6].reshape(2, 3)).shape == (2, 3, 1)
     assert many(-0.01).shape == (1,)
-    assert_allclose(one(time, 2), many(time, 2)[:, 0])
+    assert_allclose(single(time, 2), many(time, 2)[:, 0])
 
 
 def test_smooth_leaves_its_input_alone():

@@ -227,7 +227,10 @@ def test_the_letter_is_two_pages_that_say_whose_they_are(demo):
     assert min(scales) * SMALLEST_LETTERS_PX * POINTS_PER_PX > 5.5, "points, of the smallest letters"
     assert shown == ["Verdict", "Strides", "Joint angles", "Joint moments", "Joint powers", "What to do next"]
     assert len(headings) == 2
-    assert all("synthetic walker" in one and "72.6 kg" in one and "Laboratory: Ward <5>" in one for one in headings)
+    assert all(
+        "synthetic walker" in heading and "72.6 kg" in heading and "Laboratory: Ward <5>" in heading
+        for heading in headings
+    )
     assert blank >= 3
     assert pages(page, prefer_css_page_size=True) == 2
     assert page.locator("body.summary").count() == 0, "once it is printed, everything is there again"
@@ -348,13 +351,13 @@ def test_saved_numbers_of_error_bars_and_of_the_map_are_those_of_the_fit(demo, f
 def assert_same_moments(table, cycles):
     """What is in the figure's CSV is what `fit.cycles` says, in single precision."""
     for side, word in (("r", "right"), ("l", "left")):
-        own = table[
+        curve = table[
             (table.panel == "Knee moment, flexion + (N m/kg)")
             & table.curve.isin([f"{word}, mean", f"{word}, one stride"])
         ]
         rows = cycles[(cycles.quantity == "knee_angle_moment") & (cycles.side == side)]
-        assert own.x.tolist() == list(range(101))
-        np.testing.assert_allclose(own.y, rows.groupby("percent").value.mean(), rtol=1e-5, atol=1e-6)
+        assert curve.x.tolist() == list(range(101))
+        np.testing.assert_allclose(curve.y, rows.groupby("percent").value.mean(), rtol=1e-5, atol=1e-6)
 
 
 # --- comparison, dark mode

@@ -28,7 +28,7 @@ def cycles(fit):
     return fit.cycles()
 
 
-def of(cycles, quantity, side, stride=1):
+def rows_of_curve(cycles, quantity, side, stride=1):
     rows = cycles[(cycles.quantity == quantity) & (cycles.side == side) & (cycles.stride == stride)]
     return rows.set_index("percent")
 
@@ -51,7 +51,10 @@ def test_values_are_those_over_time(fit, cycles):
         def over_time(table, side=side, at=at[inside]):
             return np.interp(at, table.index, table[f"knee_angle_{side}"])
 
-        moment, angle = of(cycles, "knee_angle_moment", side, number), of(cycles, "knee_angle_angle", side, number)
+        moment, angle = (
+            rows_of_curve(cycles, "knee_angle_moment", side, number),
+            rows_of_curve(cycles, "knee_angle_angle", side, number),
+        )
         gap = moment.value[inside] - over_time(trial.moments["estimate"]) / fit.subject.mass_kg
         scale = np.abs(moment.value).max()
         assert np.abs(gap).max() < 0.05 * scale  # a line between frames cuts a peak off
@@ -85,7 +88,7 @@ def test_three_dimensional_moments_are_those_over_time(fit, cycles):
         for name, axis in ((f"knee_{stride.side}", 1), (f"hip_{stride.side}", 0), ("lumbar", 1)):
             base, component = name.removesuffix(f"_{stride.side}"), ("flexion", "adduction", "rotation")[axis]
             component = "bending" if name == "lumbar" else component
-            found = of(cycles, f"{base}_{component}_joint_moment", stride.side, stride.number)
+            found = rows_of_curve(cycles, f"{base}_{component}_joint_moment", stride.side, stride.number)
             row = joints.joints.index(name)
             values, sd = joints.moments[:, row, axis], curves.moment_sd[:, row, axis]
             known = np.isfinite(values)
@@ -102,8 +105,8 @@ def test_three_dimensional_moments_are_those_over_time(fit, cycles):
 def test_power_is_moment_times_velocity(fit, cycles):
     """Over a measured interval the work is what the moment does on the way: both are in the table."""
     stride = fit.trials[0].strides[0]
-    moment, power = (of(cycles, f"hip_flexion_{kind}", stride.side) for kind in ("moment", "power"))
-    angle = np.radians(of(cycles, "hip_flexion_angle", stride.side).value.to_numpy())
+    moment, power = (rows_of_curve(cycles, f"hip_flexion_{kind}", stride.side) for kind in ("moment", "power"))
+    angle = np.radians(rows_of_curve(cycles, "hip_flexion_angle", stride.side).value.to_numpy())
     step_s = (stride.end_s - stride.start_s) / 100
     middle = (moment.value.to_numpy()[1:] + moment.value.to_numpy()[:-1]) / 2
     by_path = np.nansum(middle * np.diff(angle))
@@ -115,7 +118,7 @@ def test_ground_reactions_are_shares_of_body_weight(fit, cycles):
     (trial,) = fit.trials
     usual = fit.cycles("literature")
     for stride in trial.strides:
-        upward = of(usual, "ground_force_upward", stride.side, stride.number).value
+        upward = rows_of_curve(usual, "ground_force_upward", stride.side, stride.number).value
         if upward.notna().sum() < 60:
             continue
         loads, foot = trial.kinematics.trial.loads, "rl".index(stride.side)
@@ -124,7 +127,7 @@ def test_ground_reactions_are_shares_of_body_weight(fit, cycles):
         expected = 100 * measured / (fit.subject.mass_kg * 9.80665)
         np.testing.assert_allclose(upward[inside], expected[inside], atol=1.0)
         assert upward.max() > 80
-        forward = of(usual, "ground_force_forward", stride.side, stride.number).value
+        forward = rows_of_curve(usual, "ground_force_forward", stride.side, stride.number).value
         assert forward[:30].min() < -5 or forward[30:].max() > 5  # brakes first, then pushes
 
 
@@ -173,8 +176,8 @@ def test_figures_draw_the_mean_of_the_strides(fit, cycles):
 
 def test_the_usual_pipeline_is_of_the_strides_that_the_estimate_is_of(fit):
     """Inverse kinematics knows strides that no plate measured: their mean would be another without any method."""
-    one = next(cycle_curves(fit.trials[0], fit.mass_kg))
-    flat = [replace(one, stride=replace(one.stride, number=k), value=np.full(101, 10.0 * k)) for k in (1, 2, 3)]
+    first = next(cycle_curves(fit.trials[0], fit.mass_kg))
+    flat = [replace(first, stride=replace(first.stride, number=k), value=np.full(101, 10.0 * k)) for k in (1, 2, 3)]
     known = [np.arange(101) < 40, np.arange(101) < 80]
     estimate = [
         replace(curve, value=np.where(where, curve.value + 1.0, np.nan))
@@ -200,10 +203,10 @@ def test_dotted_curves_are_called_what_they_are(fit):
 def test_bands_between_strides_are_promised_where_there_are_some(fit, overlap):
     """Of a second stride of each side, of which the same part of the cycle is measured, or the other one."""
     (trial,) = fit.trials
-    strides = [next(one for one in trial.strides if one.side == side) for side in "rl"]
+    strides = [next(stride for stride in trial.strides if stride.side == side) for side in "rl"]
     duration = np.ptp(trial.time)
-    later = [replace(one, number=2, start_s=one.start_s + (0 if overlap else duration)) for one in strides]
-    later = [replace(one, end_s=one.end_s + (0 if overlap else 2 * duration)) for one in later]
+    later = [replace(stride, number=2, start_s=stride.start_s + (0 if overlap else duration)) for stride in strides]
+    later = [replace(stride, end_s=stride.end_s + (0 if overlap else 2 * duration)) for stride in later]
     walk = replace(trial)
     walk.__dict__["strides"] = (*strides, *later)
     walked = replace(fit, trials=(walk,))
@@ -313,18 +316,18 @@ def next_to_opensim(fit_with_model, measured_folder):
     known = (stride.time >= moments.index[0]) & (stride.time <= moments.index[-1])
     assert 75 < known.sum() < 85
 
-    def of(one, stage, attribute="value"):
-        curves = {curve.quantity: curve for curve in cycle_curves(one, fit.mass_kg, stage, [stride])}
+    def curves_of(trial_fit, stage, attribute="value"):
+        curves = {curve.quantity: curve for curve in cycle_curves(trial_fit, fit.mass_kg, stage, [stride])}
         return np.array([getattr(curves[f"{joint}_moment"], attribute)[known] for joint in LEGS])
 
     at = stride.time[known]
     theirs = np.array([np.interp(at, moments.index, moments[f"{joint}_r_moment"]) for joint in LEGS]) / fit.mass_kg
     return NextToOpenSim(
         theirs,
-        of(moved, "literature"),
-        of(trial, "literature"),
-        of(trial, "estimate"),
-        of(trial, "estimate", "sd"),
+        curves_of(moved, "literature"),
+        curves_of(trial, "literature"),
+        curves_of(trial, "estimate"),
+        curves_of(trial, "estimate", "sd"),
         at < moments.index[-1] - OPENSIM_END_S,
     )
 
@@ -336,11 +339,11 @@ def along(curves):
 @pytest.mark.slow
 def test_curves_of_opensims_motion_are_opensims(next_to_opensim):
     """Its example to within half of the deviation that we state; a curve that is late by 1 % of the cycle is not."""
-    one = next_to_opensim
-    half = 0.5 * along(one.sd[:, one.inner])
-    assert (along((one.on_their_motion - one.theirs)[:, one.inner]) < half).all()
-    late = np.roll(one.on_their_motion, 1, axis=1)
-    assert (along((late - one.theirs)[:, one.inner][:, 1:]) > half).all()
+    compared = next_to_opensim
+    half = 0.5 * along(compared.sd[:, compared.inner])
+    assert (along((compared.on_their_motion - compared.theirs)[:, compared.inner]) < half).all()
+    late = np.roll(compared.on_their_motion, 1, axis=1)
+    assert (along((late - compared.theirs)[:, compared.inner][:, 1:]) > half).all()
 
 
 @pytest.mark.slow
@@ -350,11 +353,11 @@ def test_estimated_curves_are_near_opensims(next_to_opensim):
 
     OpenSim's example weighs the markers of the pelvis tenfold, which turns it by 8 degrees.
     """
-    one = next_to_opensim
-    assert (along((one.estimate - one.usual) / one.sd) < stats.norm.isf(0.025 / len(LEGS))).all()
-    motion = along(one.usual - one.on_their_motion)
-    assert (along(one.estimate - one.theirs) < 1.96 * along(one.sd) + motion).all()
-    assert (motion < 2.0 * along(one.sd)).all(), "the share of the motion is no licence"
+    compared = next_to_opensim
+    assert (along((compared.estimate - compared.usual) / compared.sd) < stats.norm.isf(0.025 / len(LEGS))).all()
+    motion = along(compared.usual - compared.on_their_motion)
+    assert (along(compared.estimate - compared.theirs) < 1.96 * along(compared.sd) + motion).all()
+    assert (motion < 2.0 * along(compared.sd)).all(), "the share of the motion is no licence"
 
 
 def test_a_report_without_clinical_angles(fit, monkeypatch):
@@ -369,9 +372,11 @@ def test_a_report_without_clinical_angles(fit, monkeypatch):
 def test_curves_of_both_stages_together_are_those_of_each(fit):
     together = drawn_curves(fit)
     for stage, curves in together.items():
-        alone = [one for trial in fit.trials for one in cycle_curves(trial, fit.mass_kg, stage)]
-        of_strides = [one for one in curves if one.stride.phase == "stride"]
-        assert {(one.quantity, one.stride) for one in alone} == {(one.quantity, one.stride) for one in of_strides}
-        values = {(one.quantity, one.stride): one.value for one in alone}
-        for one in of_strides:
-            np.testing.assert_array_equal(one.value, values[one.quantity, one.stride])
+        alone = [cycle_curve for trial in fit.trials for cycle_curve in cycle_curves(trial, fit.mass_kg, stage)]
+        of_strides = [curve for curve in curves if curve.stride.phase == "stride"]
+        assert {(curve.quantity, curve.stride) for curve in alone} == {
+            (of_stride.quantity, of_stride.stride) for of_stride in of_strides
+        }
+        values = {(curve.quantity, curve.stride): curve.value for curve in alone}
+        for of_stride in of_strides:
+            np.testing.assert_array_equal(of_stride.value, values[of_stride.quantity, of_stride.stride])

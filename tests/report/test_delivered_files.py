@@ -108,10 +108,10 @@ def test_moments_over_the_gait_cycle_are_those_of_opensim(opensim, folder_of, tm
     compared = 0
     for stride in strides.itertuples():
         time = np.linspace(stride.start_s, stride.end_s, 101)
-        own = cycles[(cycles.side == stride.side) & (cycles.stride == stride.stride)].set_index("quantity")
+        rows = cycles[(cycles.side == stride.side) & (cycles.stride == stride.stride)].set_index("quantity")
         for joint in ("hip_flexion", "hip_adduction", "hip_rotation", "knee_angle", "ankle_angle", "subtalar_angle"):
             column = theirs[f"{joint}_{stride.side}_moment"] / mass_kg
-            ours = own.loc[f"{joint}_moment", "value"].to_numpy()
+            ours = rows.loc[f"{joint}_moment", "value"].to_numpy()
             gap = ours - make_interp_spline(theirs.index, column, k=3)(time)
             assert np.nanmax(np.abs(gap)) < PEAK * column.abs().max(), joint
             assert np.isfinite(gap).mean() > 0.8
@@ -195,10 +195,10 @@ def test_a_second_fit_finds_the_instruments_put_right(request, folder_of, tmp_pa
             del arguments[at : at + 2]
         again = fitted(tmp_path / "out", *arguments, "--forces", folder / FORCES_FILE, "--loads", folder / LOADS_FILE)
     assert again.trial["window_s"] == pytest.approx(window_s)
-    instruments = [one for one in again.summary["calibration"] if one["kind"] in ("plate", "synchronisation")]
+    instruments = [entry for entry in again.summary["calibration"] if entry["kind"] in ("plate", "synchronisation")]
     assert len(instruments) == 18
-    for one in instruments:
-        assert abs(one["value"]) < one["sd"], one
+    for instrument in instruments:
+        assert abs(instrument["value"]) < instrument["sd"], instrument
     for kind, unit in (("force", "N"), ("moment", "Nm")):
         key = f"residual_{kind}_rms_{unit}"
         assert again.trial[key]["estimate"] < 1.1 * first["trials"][0][key]["estimate"]

@@ -10,10 +10,10 @@ from report_page import Elements
 
 
 def test_fit_trial_and_parameters_show_themselves(fit, two_level):
-    for one in (fit, two_level):
-        shown = Elements(one._repr_html_())
-        assert one.subject.name in shown.text
-        assert one.overview.line in shown.text
+    for result in (fit, two_level):
+        shown = Elements(result._repr_html_())
+        assert result.subject.name in shown.text
+        assert result.overview.line in shown.text
         assert len(shown.named("tr")) == 1 + 4 + 1 + 120
     found = Elements(replace(fit, findings=FAULTY)._repr_html_()).text
     assert ZERO.message in found

@@ -51,13 +51,13 @@ def test_plotly_accepts_every_name_and_value_of_every_figure(which, request):
 def test_names_of_bodies_are_shown_as_they_are(fit):
     """plotly would take `<b>` for bold, and `<a href>` for a link."""
     name = '<b>=cmd|</b><a href="http://x.y">'
-    named = tuple(name if one == "pelvis" else one for one in fit.estimate.segments)
+    named = tuple(name if segment == "pelvis" else segment for segment in fit.estimate.segments)
     bodies = {kind: replace(getattr(fit, kind), segments=named) for kind in ("literature", "estimate")}
     joints = [
         replace(joint, **{end: name for end in ("parent", "child") if getattr(joint, end) == "pelvis"})
         for joint in fit.skeleton.joints
     ]
-    worn = [replace(one, segment=name) if one.segment == "pelvis" else one for one in fit.skeleton.markers]
+    worn = [replace(marker, segment=name) if marker.segment == "pelvis" else marker for marker in fit.skeleton.markers]
     evil = replace(fit, **bodies, skeleton=replace(fit.skeleton, joints=tuple(joints), markers=tuple(worn)))
     figures = [change_figure(evil), departure_figure(evil), information_figure(evil), body_figure(evil)]
     for figure in figures:
@@ -175,7 +175,7 @@ def test_joint_moments_over_time_are_shaded_where_a_side_is_not_known(fit):
     trial, mass = fit.trials[0], fit.literature.total_mass_kg
     curves = trial.joint_curves
     figure = as_plotly(joint_moment_figure(trial, mass, "isb"))
-    titles = [one.text for one in figure.layout.annotations]
+    titles = [annotation.text for annotation in figure.layout.annotations]
     panel = next(k for k, title in enumerate(titles) if "Knee adduction" in title)
     axis = f"x{panel + 1}" if panel else "x"
     row = curves.joints["estimate"].joints.index("knee_r")
@@ -335,7 +335,7 @@ def test_coordinates_without_a_partner_keep_their_names():
     skeleton = SimpleNamespace(
         name="mine", coordinates=("tilt", "hip_r", "hip_l", "knee_r"), rotational=np.array([True] * 4)
     )
-    assert [(one.title, one.columns) for one in panels_of(skeleton)] == [
+    assert [(coordinate.title, coordinate.columns) for coordinate in panels_of(skeleton)] == [
         ("tilt", {"": 0}),
         ("hip", {"r": 1, "l": 2}),
         ("knee r", {"": 3}),
@@ -381,7 +381,7 @@ def test_events_of_the_demo_alternate(fit):
     for side in "rl":
         kinds = [event.kind for event in gait_events(fit.trials[0].kinematics.trial) if event.side == side]
         assert kinds
-        assert all(one != other for one, other in itertools.pairwise(kinds))
+        assert all(kind != other for kind, other in itertools.pairwise(kinds))
 
 
 def test_departures_are_from_the_prior_where_more_is_known_than_the_literature(fit):

@@ -10,9 +10,9 @@ from report_page import Elements
 
 
 def test_residuals_are_told_at_both_bandwidths(fit, two_level):
-    for one in (fit, two_level):
-        trial = one.trials[0]
-        shown = Elements(render(one)).text
+    for result in (fit, two_level):
+        trial = result.trials[0]
+        shown = Elements(render(result)).text
         assert f"motion's bandwidth ({bandwidths(trial)})" in shown
         for residuals in (trial.residuals, trial.full_residuals):
             for part in np.hsplit(residuals["estimate"], 2):
@@ -23,7 +23,7 @@ def test_residuals_are_told_at_both_bandwidths(fit, two_level):
 
 def test_report_says_which_forces_the_moments_are_from(fit, two_level):
     trial = fit.trials[0]
-    (used,) = [one for one in fit.findings if one.code == "R402"]
+    (used,) = [finding for finding in fit.findings if finding.code == "R402"]
     assert used.where.trial == trial.name
     assert used.evidence["which"].value in Elements(render(fit)).text
     struck = np.zeros_like(trial.reactions.impact)

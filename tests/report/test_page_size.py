@@ -41,13 +41,15 @@ def prolonged(trial, times):
         on_ground=again(kinematics.trial.on_ground, shown),
     )
     curves = trial.joint_curves
-    own = shown - kinematics.trajectory_frames.start
+    frames_of_motion = shown - kinematics.trajectory_frames.start
 
-    def parts(one, frames=slice(None)):
-        return {name: again(getattr(one, name), frames) for name in vars(one)}
+    def parts(record, frames=slice(None)):
+        return {name: again(getattr(record, name), frames) for name in vars(record)}
 
-    def joints(one):
-        return replace(one, moments=again(one.moments, own), forces=again(one.forces, own))
+    def joints(of_stage):
+        return replace(
+            of_stage, moments=again(of_stage.moments, frames_of_motion), forces=again(of_stage.forces, frames_of_motion)
+        )
 
     solved = replace(ik, time=time, q=again(ik.q, shown), errors_m=again(ik.errors_m, shown))
     return replace(
@@ -67,11 +69,11 @@ def prolonged(trial, times):
         marker_errors_m={stage: again(values) for stage, values in trial.marker_errors_m.items()},
         joint_curves=JointCurves(
             time,
-            again(curves.known, own),
-            Motion(**parts(curves.motion, own)),
-            {stage: again(values, own) for stage, values in curves.forces.items()},
-            {stage: joints(one) for stage, one in curves.joints.items()},
-            CurveDeviations(**parts(curves.deviations, own)),
+            again(curves.known, frames_of_motion),
+            Motion(**parts(curves.motion, frames_of_motion)),
+            {stage: again(values, frames_of_motion) for stage, values in curves.forces.items()},
+            {stage: joints(of_stage) for stage, of_stage in curves.joints.items()},
+            CurveDeviations(**parts(curves.deviations, frames_of_motion)),
         ),
     )
 

@@ -113,7 +113,9 @@ def violations(page):
     """What axe finds, in one line each."""
     found = axe.Axe().run(page, AROUND_FIGURES, VIOLATIONS).response
     assert len(found["passes"]) > 15
-    return [f"{one['id']}: {[node['target'] for node in one['nodes'][:3]]}" for one in found["violations"]]
+    return [
+        f"{violation['id']}: {[node['target'] for node in violation['nodes'][:3]]}" for violation in found["violations"]
+    ]
 
 
 def look(opened, width, scheme):
@@ -177,7 +179,7 @@ def test_axe_would_find_what_is_wrong(browser, tmp_path):
         encoding="utf-8",
     )
     opened = Opened(browser, tmp_path / "bad.html")
-    found = {one["id"] for one in axe.Axe().run(opened.page, None, VIOLATIONS).response["violations"]}
+    found = {violation["id"] for violation in axe.Axe().run(opened.page, None, VIOLATIONS).response["violations"]}
     assert {"html-has-lang", "image-alt", "button-name", "color-contrast"} <= found
     opened.page.close()
 
@@ -209,8 +211,8 @@ def test_one_view_shows_the_trial_that_is_chosen_and_zooms_by_key_and_button(bro
     above = opened.picture(canvas)
     page.keyboard.press("0")
     np.testing.assert_array_equal(opened.picture(canvas), start)
-    for one, other in ((start, front), (front, above)):
-        assert (np.abs(one - other).max(axis=2) > 0.3).mean() > 0.005
+    for before, other in ((start, front), (front, above)):
+        assert (np.abs(before - other).max(axis=2) > 0.3).mean() > 0.005
     playwright.expect(canvas).to_be_focused()
     page.close()
 

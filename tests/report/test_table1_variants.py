@@ -27,9 +27,9 @@ def test_rows_have_the_published_first(tables):
 def test_frame_has_every_draw(tables):
     frame = variants_frame(tables)
     assert len(frame) == 2 * (4 + 2)
-    one = frame[(frame["variant"] == LONG_GROUND) & (frame["draw"] == 1) & (frame["condition"] == "correction_noise")]
-    assert one["mass_rms_kg"].item() == 4 * 1.71
-    assert one["iterations"].item() == 3
+    rows = frame[(frame["variant"] == LONG_GROUND) & (frame["draw"] == 1) & (frame["condition"] == "correction_noise")]
+    assert rows["mass_rms_kg"].item() == 4 * 1.71
+    assert rows["iterations"].item() == 3
     assert set(frame[~frame["condition"].isin(NOISY)]["draw"]) == {0}
 
 

@@ -139,12 +139,12 @@ def _command_lines(text):
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_commands_and_options_named_exist(page):
     commands = dict(reference.commands())
-    general = {name for one in typer.main.get_command(application()).params for name in one.opts} | {"--help"}
+    general = {name for param in typer.main.get_command(application()).params for name in param.opts} | {"--help"}
     for line in _command_lines(page.read_text(encoding="utf-8")):
         words = shlex.split(line, comments=True)
         name = max((name for name in commands if words[: name.count(" ") + 1] == name.split()), key=len, default=None)
         assert name or words[1].startswith("-"), f"no such command: {line}"
-        known = {option for one in commands[name].params for option in one.opts} | {"--help"} if name else general
+        known = {option for param in commands[name].params for option in param.opts} | {"--help"} if name else general
         assert {word for word in words if word.startswith("-")} <= known, line
 
 

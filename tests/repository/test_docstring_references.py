@@ -68,4 +68,6 @@ def test_docstrings_of_functions_begin_with_a_verb():
     functions = [
         (path, node) for path, tree in trees.items() for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)
     ]
-    assert [(path, one.name) for path, one in functions if re.match(r"[A-Z]\d", ast.get_docstring(one) or "")] == []
+    assert [
+        (path, function.name) for path, function in functions if re.match(r"[A-Z]\d", ast.get_docstring(function) or "")
+    ] == []

@@ -41,10 +41,12 @@ def test_the_address_stands_in_one_place():
 
 
 def test_every_supported_python_is_a_classifier_and_tested():
-    classifiers = [each.split(" :: ")[-1] for each in PROJECT["project"]["classifiers"] if "Python :: 3." in each]
+    classifiers = [
+        classifier.split(" :: ")[-1] for classifier in PROJECT["project"]["classifiers"] if "Python :: 3." in classifier
+    ]
     assert tuple(classifiers) == CHECKED
     quick = (ROOT / ".github/workflows/ci.yml").read_text(encoding="utf-8")
-    assert "python: [" + ", ".join(f'"{one}"' for one in CHECKED) + "]" in quick
+    assert "python: [" + ", ".join(f'"{python}"' for python in CHECKED) + "]" in quick
 
 
 @pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.name)

@@ -29,17 +29,17 @@ def folder(parent, name, delay_s, mass_kg):
 
 
 def test_chi2_is_about_the_weighted_mean():
-    one = Shared("a", "mass", "kg", (Estimate("a", 0.0, 1.0, 9.0), Estimate("b", 3.0, 2.0, 9.0)))
-    assert weighted_mean(one.estimates) == pytest.approx((0.6, (4 / 5) ** 0.5))
-    assert one.chi2 == pytest.approx(0.6**2 + 1.2**2)
-    assert not one.beyond
-    assert one.apart == [False]
+    unknown = Shared("a", "mass", "kg", (Estimate("a", 0.0, 1.0, 9.0), Estimate("b", 3.0, 2.0, 9.0)))
+    assert weighted_mean(unknown.estimates) == pytest.approx((0.6, (4 / 5) ** 0.5))
+    assert unknown.chi2 == pytest.approx(0.6**2 + 1.2**2)
+    assert not unknown.beyond
+    assert unknown.apart == [False]
 
 
 def test_far_values_are_beyond_and_apart():
-    one = of_values(0.0, 0.0, 6.0)
-    assert one.beyond
-    assert one.apart == [False, True, True]
+    unknown = of_values(0.0, 0.0, 6.0)
+    assert unknown.beyond
+    assert unknown.apart == [False, True, True]
 
 
 @pytest.mark.parametrize(("values", "accused"), [((5.0, 5.0), [False, False]), ((5.0, 0.0), [True]), ((3.0, -3.0), [])])
@@ -54,7 +54,7 @@ def test_joints_and_bodies_accuse_nothing():
 def test_folders_of_results(tmp_path):
     folders = [folder(tmp_path, name, delay_s, 8.0) for name, delay_s in (("a", 0.005), ("b", 0.0))]
     sums = group_sums(shared(folders))
-    assert {group: one.unknowns for group, one in sums.items()} == {"delay": 1, "joint": 1, "mass": 1}
+    assert {group: agreement.unknowns for group, agreement in sums.items()} == {"delay": 1, "joint": 1, "mass": 1}
     assert sums["delay"].worst == pytest.approx(12.5)
     assert sums["delay"].beyond == 1
     assert sums["delay"].pairs_apart == 1.0

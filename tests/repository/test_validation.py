@@ -46,9 +46,13 @@ def test_page_of_measured_trials(fit_of):
         title = measured_trials.WALKS[name]
         assert re.search(rf"\| {title}, force \(N\) .*\| {residual[0]:.1f} \({residual[1]:.1f}\) \|", page)
         assert re.search(rf"\| {title} \| {trial['n_frames']} \| {trial['n_dynamic_frames']} \|", page)
-        for one in run["findings"]:
-            told = one["severity"] in ("WARNING", "ERROR") and one["status"] == "open" and one["muted_by"] is None
-            assert (f"{one['code']} {one['message']}" in page) == told
+        for finding in run["findings"]:
+            told = (
+                finding["severity"] in ("WARNING", "ERROR")
+                and finding["status"] == "open"
+                and finding["muted_by"] is None
+            )
+            assert (f"{finding['code']} {finding['message']}" in page) == told
 
 
 @pytest.mark.slow
@@ -150,7 +154,9 @@ def test_page_of_field_trials():
 def test_verdicts_on_sound_recordings_and_on_others():
     said = {"suitability": [{"output": "motion", "use": "do not use"}, {"output": "joint moments", "use": "use"}]}
     used = replace(field_outcome(0), content={"findings": [], **said})
-    outcomes = [(field_case(sound=sound), one) for sound in (True, False, None) for one in (used, field_outcome(2))]
+    outcomes = [
+        (field_case(sound=sound), outcome) for sound in (True, False, None) for outcome in (used, field_outcome(2))
+    ]
     found = field_trials.verdicts([*outcomes, (field_case(), field_outcome(2))])
     assert "| nothing known that concerns joint moments | 1 of 2 | 0 of 2 | 0 of 2 | 1 of 2 |" in found
     assert "| a fault that concerns them | 1 of 3 | 0 of 3 | 0 of 3 | 2 of 3 |" in found

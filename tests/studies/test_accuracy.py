@@ -118,34 +118,34 @@ def test_faults_are_what_they_say(trial):
     assert hips.locked["hip_x_r"] == hips.locked["hip_x_l"] == 0.015
     tilt = tilted(trial.skeleton, np.radians(5.0), rng(1))
     pairs = [
-        (one, other)
+        (axis, other)
         for a, b in zip(trial.skeleton.joints, tilt.joints, strict=True)
-        for one, other in zip(a.axes, b.axes, strict=True)
-        if one != other
+        for axis, other in zip(a.axes, b.axes, strict=True)
+        if axis != other
     ]
-    assert {one.coordinate.rsplit("_", 1)[0] for one, _ in pairs} == {
+    assert {axis.coordinate.rsplit("_", 1)[0] for axis, _ in pairs} == {
         "knee_angle",
         "ankle_angle",
         "subtalar_angle",
         "elbow_flex",
     }
-    angles = [np.degrees(np.arccos(np.dot(one.direction, other.direction))) for one, other in pairs]
+    angles = [np.degrees(np.arccos(np.dot(axis.direction, other.direction))) for axis, other in pairs]
     assert angles == pytest.approx([5.0] * 8)
 
 
 def test_all_trials_of_a_person_have_the_same_skin_skeleton_and_plates(trial):
     """But zeros and gains of their own while somebody stands on the plate, and delays of hundredths of a ms."""
     twice = [trial, trial]
-    skeleton, (one, other) = measured(twice, Faults("artefact", calibration=True), np.random.default_rng(4))
+    skeleton, (first, other) = measured(twice, Faults("artefact", calibration=True), np.random.default_rng(4))
     assert skeleton is not trial.skeleton
-    apart = one.trial.markers.positions - other.trial.markers.positions
+    apart = first.trial.markers.positions - other.trial.markers.positions
     assert np.std(apart) == pytest.approx(np.sqrt(2.0) * CAMERA_SD_M, rel=0.02)
-    change = other.trial.loads.force - one.trial.loads.force
-    for foot, vertical in enumerate(one.trial.loads.force[..., 1].T):
+    change = other.trial.loads.force - first.trial.loads.force
+    for foot, vertical in enumerate(first.trial.loads.force[..., 1].T):
         firm = vertical > 200.0
         gain = np.mean(change[firm, foot, 1] / vertical[firm])
         assert np.abs(gain) < 0.1
-        change[firm, foot] -= gain * one.trial.loads.force[firm, foot]
+        change[firm, foot] -= gain * first.trial.loads.force[firm, foot]
         assert np.abs(change[firm, foot, 1]).max() < 2.0
         zeros = change[firm, foot][:, [0, 2]]
         assert (zeros.std(axis=0) < 0.2 * np.abs(zeros.mean(axis=0))).all()

@@ -91,18 +91,20 @@ def test_mistakes_are_named(mistake, person, sound, tmp_path):
 
 @pytest.mark.parametrize("name", ["all left and right labels swapped", "forces 100 ms late"])
 def test_a_fit_is_blocked_by_what_blocks_check(name, person, tmp_path):
-    mistake = next(one for one in MISTAKES if one.name == name)
+    mistake = next(candidate for candidate in MISTAKES if candidate.name == name)
     path = write_person(tmp_path, mistake.change(person, np.random.default_rng(5)))
-    errors = {one.code for one in reported(checked(path)) if one.severity is Severity.ERROR}
+    errors = {
+        found_finding.code for found_finding in reported(checked(path)) if found_finding.severity is Severity.ERROR
+    }
     with pytest.raises(BlockedError) as blocked:
         prepare_subject(path)
-    assert {one.code for one in blocked.value.blocking} == errors
+    assert {found_finding.code for found_finding in blocked.value.blocking} == errors
     assert errors & mistake.codes
 
 
 def test_every_fault_has_codes_of_the_catalogue():
-    assert {code for one in MISTAKES for code in one.codes} <= set(all_rules())
-    assert [one.name for one in MISTAKES if not one.codes] == ["the other sex"]
+    assert {code for candidate in MISTAKES for code in candidate.codes} <= set(all_rules())
+    assert [candidate.name for candidate in MISTAKES if not candidate.codes] == ["the other sex"]
 
 
 WALK, ZERO_FAULT = Where(trial="walk", plate="plate 1"), Mistake("x", lambda person, rng: person, frozenset({"P213"}))
@@ -172,7 +174,9 @@ def test_page(outcomes):
     assert counts(outcomes[1]) == {"identified": 2, "warned": 1, "harmless": 1, "unnoticed": 1}
     content = json.loads(json.dumps(faults_summary(*outcomes)))
     assert content["outcomes"][0]["change_nm"] is None
-    assert [one["code"] for one in content["sound"]["other"]] == [one.code for one in FAULTY]
+    assert [found_finding["code"] for found_finding in content["sound"]["other"]] == [
+        found_finding.code for found_finding in FAULTY
+    ]
 
 
 def test_codes_are_counted(outcomes):
@@ -205,11 +209,18 @@ def test_measured_walks_have_subject_files(measured_folder, tmp_path):
 def test_sound_laboratories_are_not_doubted(tmp_path):
     """Two people whose bodies, markers and plates differ as those of sound laboratories do."""
     people = run_sound(sound_laboratories(tmp_path, 2))
-    assert [[one.code for one in reported(each.findings) if one.severity > Severity.CORRECTED] for each in people] == [
+    assert [
+        [
+            found_finding.code
+            for found_finding in reported(walked.findings)
+            if found_finding.severity > Severity.CORRECTED
+        ]
+        for walked in people
+    ] == [
         [],
         [],
     ]
-    moments = [one.moments.moment_nm for one in people]
+    moments = [walked.moments.moment_nm for walked in people]
     assert moments[0].shape != moments[1].shape or np.abs(moments[0] - moments[1]).max() > 1.0
 
 
@@ -218,11 +229,11 @@ def test_sound_laboratories_are_not_doubted(tmp_path):
 def test_study_of_a_walk(tmp_path):
     """One mistake that check names, one that the fit has to look at."""
     wanted = {"forces in kg", "the other sex"}
-    picked = [one for one in MISTAKES if one.name in wanted]
+    picked = [candidate for candidate in MISTAKES if candidate.name in wanted]
     (sound,), outcomes_of_faults = run_faults({"walk": synthetic_walk(tmp_path / "lab")}, picked)
     assert sound.moments is not None
-    assert not any(one.severity is Severity.ERROR for one in reported(sound.findings))
-    by_name = {one.mistake: one for one in outcomes_of_faults}
+    assert not any(answer.severity is Severity.ERROR for answer in reported(sound.findings))
+    by_name = {outcomes_of_fault.mistake: outcomes_of_fault for outcomes_of_fault in outcomes_of_faults}
     assert (by_name["forces in kg"].outcome, by_name["forces in kg"].by) == ("identified", "check")
     other = by_name["the other sex"]
     assert other.outcome in ("harmless", "identified", "warned")

@@ -20,7 +20,7 @@ def person(tmp_path_factory):
 
 def found(folder, person):
     """What `kinertia check` finds, by code, the worst first."""
-    return {one.code: one for one in reversed(reported(checked(write_person(folder, person))))}
+    return {finding.code: finding for finding in reversed(reported(checked(write_person(folder, person))))}
 
 
 def with_force(person, change):

@@ -36,12 +36,12 @@ def test_with_white_noise_alone_it_is_the_estimator_s_own(monkeypatch):
     known = calibration.instruments
     plate, floor = (dict.fromkeys(names, exact) for names in (known.plate, known.floor))
     calibration = replace(calibration, instruments=InstrumentPrior(plate, floor, exact, exact, exact))
-    own = Information(
+    without_prior = Information(
         MapProblem(trial.skeleton, replace(prior, mean=trial.bsp), calibration, [white]),
         np.ones((1, 1)),
     )
     ours = study_bound.bound(information, replace(prior, mean=trial.bsp))
-    sd = own.sd([0])[[k for k, segment in enumerate(prior.mean.segments) if not segment.endswith("_l")]]
+    sd = without_prior.sd([0])[[k for k, segment in enumerate(prior.mean.segments) if not segment.endswith("_l")]]
     theirs = [np.sqrt(np.mean(np.square(sd[:, part]))) for part in (slice(0, 1), slice(1, 4), slice(4, 7))]
     assert ours == pytest.approx(theirs, rel=0.02)
 

@@ -31,7 +31,7 @@ def trial():
 
 
 @pytest.fixture(scope="module")
-def one(trial):
+def one_draw(trial):
     """One draw, without the seconds of estimating: its start is what is found."""
 
     def given_back(skeleton, start, windows, correct):
@@ -89,9 +89,9 @@ def test_without_noise_every_parameter_is_found_from_every_start(trial):
             assert_exact(draw.errors[condition], PUBLISHED[condition])
 
 
-def test_starts_are_off_by_up_to_a_half(one):
-    (draw,) = one.draws
-    share = draw.start_errors / one.truth
+def test_starts_are_off_by_up_to_a_half(one_draw):
+    (draw,) = one_draw.draws
+    share = draw.start_errors / one_draw.truth
     assert len(share) == 49
     assert 0.4 < np.abs(share).max() <= 0.5
     assert np.abs(share).mean() == pytest.approx(0.25, abs=0.08)
@@ -107,8 +107,8 @@ def test_bit_for_bit_whatever_the_workers_and_the_number_of_draws(trial, monkeyp
 
     monkeypatch.setattr("kinertia.studies.table1.in_parallel", without_it)
     monkeypatch.setattr("kinertia.studies.table1.CONDITIONS", quick)
-    one, two = (run_table1(trial, repeats=count, seed=1, workers=count) for count in (1, 2))
-    first, alone = table1_json(two)["draws"][0], table1_json(one)["draws"][0]
+    single, two = (run_table1(trial, repeats=count, seed=1, workers=count) for count in (1, 2))
+    first, alone = table1_json(two)["draws"][0], table1_json(single)["draws"][0]
     assert json.dumps(first) == json.dumps(alone)
     assert two.draws[0].start_errors.tolist() != two.draws[1].start_errors.tolist()
 
@@ -158,16 +158,16 @@ def test_errors_are_rms_and_largest_by_class():
     assert (errors.torque_rms_Nm, errors.torque_max_Nm) == pytest.approx((np.sqrt(12.0), 6.0))
 
 
-def test_mean_and_spread_are_over_draws(one):
-    (draw,) = one.draws
-    twice = Table1(one.parameters, one.truth, (draw, draw), one.seed, one.trial)
+def test_mean_and_spread_are_over_draws(one_draw):
+    (draw,) = one_draw.draws
+    twice = Table1(one_draw.parameters, one_draw.truth, (draw, draw), one_draw.seed, one_draw.trial)
     for condition in CONDITIONS:
         assert asdict(twice.mean(condition)) == pytest.approx(asdict(draw.errors[condition]))
-        assert set(asdict(one.spread(condition)).values()) == {0.0}
+        assert set(asdict(one_draw.spread(condition)).values()) == {0.0}
 
 
-def test_json_has_the_promised_form(one):
-    content = json.loads(json.dumps(table1_json(one)))
+def test_json_has_the_promised_form(one_draw):
+    content = json.loads(json.dumps(table1_json(one_draw)))
     assert list(content["conditions"]) == list(CONDITIONS)
     quantities = ("inertia", "mass", "com", "force", "torque")
     units = ("kgm2", "kg", "m", "N", "Nm")

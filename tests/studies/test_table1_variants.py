@@ -248,11 +248,11 @@ def draw(number, factor):
 
 
 def test_measures_of_a_table():
-    one, three = draw(0, 1.0), draw(1, 3.0)
-    assert distance(table(one, three)) == pytest.approx(2.0)
-    assert helped(table(one, three)) == dict.fromkeys(CLASSES, 1.0)
-    worse = replace(one.errors["correction_noise"], com_rms_m=9.0)
-    worse = replace(one, errors={**one.errors, "correction_noise": worse})
+    first, three = draw(0, 1.0), draw(1, 3.0)
+    assert distance(table(first, three)) == pytest.approx(2.0)
+    assert helped(table(first, three)) == dict.fromkeys(CLASSES, 1.0)
+    worse = replace(first.errors["correction_noise"], com_rms_m=9.0)
+    worse = replace(first, errors={**first.errors, "correction_noise": worse})
     assert helped(table(worse, three)) == {"inertia": 1.0, "mass": 1.0, "CoM": 0.5}
 
 
@@ -271,10 +271,10 @@ def test_draws_of_variants(trial):
         results = run_variants(variants={"a": Variant(still), "b": Variant(still, times=2)}, repeats=1)
         (again,) = run_variants(variants={"c": Variant(still)}, repeats=1).values()
     a, b = results["a"], results["b"]
-    assert [len(each.draws) for each in (a, b)] == [1, 2]
+    assert [len(variant.draws) for variant in (a, b)] == [1, 2]
     alone = run_draw(trial, 1, 0, still)
-    for each in (a, b, again):
-        assert each.draws[0].errors == alone.errors
+    for variant in (a, b, again):
+        assert variant.draws[0].errors == alone.errors
     assert list(a.draws[0].errors) == list(CONDITIONS)
     assert list(b.draws[1].errors) == list(NOISY)
     assert b.draws[1].errors[NOISY[1]] != alone.errors[NOISY[1]]

@@ -23,11 +23,11 @@ LEFT = [50, 50, 0, 0, 50, 50, 0, 0, 50, 50]
 
 def test_plates_take_a_whole_right_step_and_the_next_left_one():
     forces = forces_of(RIGHT, LEFT)
-    two, one = (stance_walks.steps_on_plates(forces, steps) for steps in (2, 1))
-    assert two["ground_force_r_vy"].tolist() == one["ground_force_r_vy"].tolist() == [0, 50, 50, 0, 0, 0, 0, 0, 0, 0]
+    two, single = (stance_walks.steps_on_plates(forces, steps) for steps in (2, 1))
+    assert two["ground_force_r_vy"].tolist() == single["ground_force_r_vy"].tolist() == [0, 50, 50, 0, 0, 0, 0, 0, 0, 0]
     assert two["ground_force_l_vy"].tolist() == [0, 0, 0, 0, 50, 50, 0, 0, 0, 0]
     assert two["ground_force_l_px"].tolist() == [0, 0, 0, 0, 1, 1, 0, 0, 0, 0]
-    assert not one.filter(like="_l_").to_numpy().any()
+    assert not single.filter(like="_l_").to_numpy().any()
     assert forces["ground_force_l_vy"].tolist() == LEFT  # unchanged
     pd.testing.assert_frame_equal(stance_walks.steps_on_plates(forces, None), forces)
 
@@ -86,8 +86,8 @@ def person(measured_folder, tmp_path_factory):
     folder = tmp_path_factory.mktemp("person")
     with quietly(folder / "opensim.log"):
         model = opensim.Model(str(gait2354().model))
-        for things in (model.updForceSet(), model.updControllerSet()):
-            things.clearAndDestroy()
+        for actuators in (model.updForceSet(), model.updControllerSet()):
+            actuators.clearAndDestroy()
         model.finalizeConnections()
         model.printToXML(str(folder / "model.osim"))
         model = opensim.Model(str(folder / "model.osim"))
@@ -118,9 +118,9 @@ def test_true_moments_at_hips_are_opensims(person):
     inner = slice(15, -15)  # OpenSim's splines end freely
     for side in "rl":
         for axis in ("flexion", "adduction", "rotation"):
-            own, theirs = found[f"hip_{side}_{axis}"], expected[f"hip_{axis}_{side}_moment"]
-            assert np.abs(own).max() > 1.0
-            np.testing.assert_allclose(own.to_numpy()[inner], theirs.to_numpy()[inner], atol=0.05)
+            known, theirs = found[f"hip_{side}_{axis}"], expected[f"hip_{axis}_{side}_moment"]
+            assert np.abs(known).max() > 1.0
+            np.testing.assert_allclose(known.to_numpy()[inner], theirs.to_numpy()[inner], atol=0.05)
     lumbar, theirs = found["lumbar_flexion"], -expected["lumbar_extension_moment"]
     np.testing.assert_allclose(lumbar.to_numpy()[inner], theirs.to_numpy()[inner], atol=0.05)
 
@@ -140,12 +140,12 @@ def test_knees_are_displaced_and_all_else_stays(person):
         displace_knees(path, 1)
         wrong = Person(opensim.Model(str(path)))
     places = []
-    for one in (model, wrong):
-        one.pose(np.zeros(len(one.names)))
-        names = [one.model.getMarkerSet().get(k).getName() for k in range(one.model.getMarkerSet().getSize())]
-        knee = one.model.getBodySet().get("tibia_r").getTransformInGround(one.state).p().to_numpy()
-        axis = one.model.getBodySet().get("femur_r").getTransformInGround(one.state).R()
-        places.append((np.array([one.marker(name)[0] for name in names]), knee, [axis.get(k, 2) for k in range(3)]))
+    for posed in (model, wrong):
+        posed.pose(np.zeros(len(posed.names)))
+        names = [posed.model.getMarkerSet().get(k).getName() for k in range(posed.model.getMarkerSet().getSize())]
+        knee = posed.model.getBodySet().get("tibia_r").getTransformInGround(posed.state).p().to_numpy()
+        axis = posed.model.getBodySet().get("femur_r").getTransformInGround(posed.state).R()
+        places.append((np.array([posed.marker(name)[0] for name in names]), knee, [axis.get(k, 2) for k in range(3)]))
     (markers, knee, axis), (same, moved, turned) = places
     np.testing.assert_allclose(markers, same, atol=1e-9)
     across = moved - knee

@@ -132,7 +132,7 @@ def test_c3d_needs_corners_and_a_matching_time_base(tmp_path, measured):
 def test_c3d_holds_plates_that_are_rotated_in_the_laboratory(tmp_path, measured, degrees):
     walked, plates = measured.walk, measured.walk.plates
     rotation = Rotation.from_euler("y", degrees, degrees=True).as_matrix()
-    force, moment, corners = (each @ rotation.T for each in (plates.force, plates.moment, plates.corners))
+    force, moment, corners = (vectors @ rotation.T for vectors in (plates.force, plates.moment, plates.corners))
     rotated = replace(plates, force=force, moment=moment, corners=corners)
     markers = replace(walked.markers, positions=walked.markers.positions @ rotation.T)
     write_c3d(tmp_path / "a.c3d", replace(walked, markers=markers, plates=rotated))

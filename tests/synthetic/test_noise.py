@@ -65,12 +65,12 @@ def test_artefact_is_rigid_per_segment_and_in_the_published_range(trial):
     ground = noisy.positions - trial.markers.positions
     local = np.einsum("nmji,nmj->nmi", pose.rotation[:, trial.skeleton.marker_segments], ground)
     for s, segment in enumerate(trial.skeleton.segments):
-        own = local[:, trial.skeleton.marker_segments == s]
-        if not own.shape[1]:
+        on_segment = local[:, trial.skeleton.marker_segments == s]
+        if not on_segment.shape[1]:
             continue
-        np.testing.assert_allclose(own, own[:, :1].repeat(own.shape[1], axis=1), atol=1e-12)
+        np.testing.assert_allclose(on_segment, on_segment[:, :1].repeat(on_segment.shape[1], axis=1), atol=1e-12)
         low, high = ARTEFACT_RANGE_M.get(segment.rpartition("_")[0], OTHER_ARTEFACT_RANGE_M)
-        assert low <= np.linalg.norm(np.ptp(own[:, 0], axis=0)) <= high, segment
+        assert low <= np.linalg.norm(np.ptp(on_segment[:, 0], axis=0)) <= high, segment
 
 
 def test_artefact_is_linear_in_the_neighbouring_joint_angles(trial):
@@ -140,9 +140,9 @@ def test_same_seed_same_noise_other_seed_other_noise(trial):
         "plate": lambda rng: plate_noise(plates(), 1.0, 1.0, 0.1, rng).force,
     }
     for name, model in models.items():
-        one, again, other = (model(np.random.default_rng(seed)) for seed in (1, 1, 2))
-        np.testing.assert_array_equal(one, again, err_msg=name)
-        assert np.abs(one - other).max() > 1e-6, name
+        first, again, other = (model(np.random.default_rng(seed)) for seed in (1, 1, 2))
+        np.testing.assert_array_equal(first, again, err_msg=name)
+        assert np.abs(first - other).max() > 1e-6, name
 
 
 def test_clusters_stay_rigid_and_come_back_with_every_stride():
@@ -154,10 +154,10 @@ def test_clusters_stay_rigid_and_come_back_with_every_stride():
     stride = round(STRIDE_S / 0.01)
     np.testing.assert_allclose(local[stride : 2 * stride], local[:stride], atol=1e-9)
     for segment in np.unique(trial.skeleton.marker_segments):
-        own = trial.skeleton.marker_segments == segment
+        on_segment = trial.skeleton.marker_segments == segment
         low, high = artefact_range(trial.skeleton.segments[segment])
-        assert 0.95 * low < np.linalg.norm(np.ptp(local[:, own].mean(axis=1), axis=0)) < 1.05 * high
-        places = trial.skeleton.marker_locals[own]
-        apart = np.linalg.norm((places + local[:, own])[:, :1] - (places + local[:, own]), axis=-1)
+        assert 0.95 * low < np.linalg.norm(np.ptp(local[:, on_segment].mean(axis=1), axis=0)) < 1.05 * high
+        places = trial.skeleton.marker_locals[on_segment]
+        apart = np.linalg.norm((places + local[:, on_segment])[:, :1] - (places + local[:, on_segment]), axis=-1)
         # turns are small: distances change by their square
         assert apart == pytest.approx(np.tile(apart.mean(axis=0), (len(apart), 1)), abs=2e-3)

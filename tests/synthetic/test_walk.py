@@ -82,9 +82,9 @@ def test_walk_is_periodic_and_advances(subject):
 
 def test_everybody_walks_in_a_manner_of_his_own(subject):
     manner = Manner.draw(np.random.default_rng(4))
-    own, usual = walk(subject, 2.0, trapezoid=False, manner=manner), walk(subject, 2.0, trapezoid=False)
-    assert largest_residual(own) < 1e-9
-    swing = {name: np.ptp(own.motion.q[:, k]) for k, name in enumerate(own.skeleton.coordinates)}
+    walked, usual = walk(subject, 2.0, trapezoid=False, manner=manner), walk(subject, 2.0, trapezoid=False)
+    assert largest_residual(walked) < 1e-9
+    swing = {name: np.ptp(walked.motion.q[:, k]) for k, name in enumerate(walked.skeleton.coordinates)}
     before = {name: np.ptp(usual.motion.q[:, k]) for k, name in enumerate(usual.skeleton.coordinates)}
     for name in ("arm_flex_r", "arm_flex_l"):
         assert swing[name] == pytest.approx(manner.swing["arm_flex"] * before[name], rel=0.02)
@@ -192,7 +192,7 @@ def test_loads_that_cannot_be_balanced_are_refused(trial):
 @pytest.mark.parametrize("name", [name for name, (files, *_) in CONSISTENT.items() if is_here(files)])
 def test_a_recorded_walk_becomes_consistent(file_of, tmp_path, name):
     files, mass_kg, height_m, window_s = CONSISTENT[name]
-    static, markers, forces = (file_of(one) for one in files)
+    static, markers, forces = (file_of(part) for part in files)
     file = tmp_path / "subject.toml"
     file.write_text(
         f'[subject]\nsex = "male"\nmass_kg = {mass_kg}\nheight_m = {height_m}\n'

@@ -49,8 +49,10 @@ def test_measured_frames_are_those_of_the_floor(faster):
 def contradicted(recording, belt):
     """Stated and standing feet's speed, foot and causes that depend on them, of T301; None where there is none."""
     found = list(belt_speed(context_of(replace(recording, belt=belt), FEET)))
-    assert [one.code for one in found] in ([], ["T301"])
-    shown = [one.value for name, one in found[0].evidence.items() if name != "belt_speed_m_s"] if found else []
+    assert [finding.code for finding in found] in ([], ["T301"])
+    shown = (
+        [quantity.value for name, quantity in found[0].evidence.items() if name != "belt_speed_m_s"] if found else []
+    )
     return (*shown, *found[0].causes) if found else None
 
 
@@ -134,7 +136,7 @@ def test_two_belts(split, stated):
     np.testing.assert_array_equal(trial.measured, build_trial(on_floor, FEET).measured)
     feet = foot_trajectories(on_belts.markers, FEET, read_belt(stated))
     for foot, expected in zip(feet, foot_trajectories(on_floor.markers, FEET), strict=True):
-        spans, known = ([one[:2] for one in each.stance_spans] for each in (foot, expected))
+        spans, known = ([stance_span[:2] for stance_span in trajectory.stance_spans] for trajectory in (foot, expected))
         np.testing.assert_allclose(spans, known, atol=0.011)
 
 

@@ -23,7 +23,7 @@ def markers(path_m=(0.0, 0.0, 0.0), sway_m=0.0):
 def test_visibility_counts_frames(seen):
     positions = np.where(np.array(seen)[:, None, None], 1.0, np.nan) * np.ones((len(seen), 1, 3))
     (marker,) = visibility(Markers(np.arange(len(seen)) / RATE_HZ, ("A",), positions))
-    gaps = "".join("x" if one else "." for one in seen).split("x")
+    gaps = "".join("x" if is_seen else "." for is_seen in seen).split("x")
     assert marker.share == pytest.approx(sum(seen) / len(seen))
     if len(seen) > 1:
         assert marker.longest_gap_s == pytest.approx(max(map(len, gaps)) / RATE_HZ)

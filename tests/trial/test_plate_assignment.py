@@ -357,7 +357,7 @@ WHOLE = {
 }  # fmt: skip
 """Files, markers of the feet, and when all ground contact is measured: of the package's walk, which knows when feet
 land and leave (`data/walk.csv`), between steps beside the plates; of the run up to its last flight."""
-REAL = {name: one for name, one in WHOLE.items() if is_here(one[0])}
+REAL = {name: files for name, files in WHOLE.items() if is_here(files[0])}
 
 
 @pytest.fixture(scope="module")
@@ -375,7 +375,7 @@ def test_window_of_whole_trials(real, name):
     trial = build_trial(recording, feet)
     assert len(trial.windows()) == 1
     assert trial.windows()[0] == pytest.approx(window, abs=0.025)
-    wrong = [one for one in trial.findings if one.code == "P277"]
+    wrong = [reported for reported in trial.findings if reported.code == "P277"]
     assert len(wrong) == (1 if name in ("walking1", "walking2", "squats1") else 0)
 
 
@@ -427,7 +427,9 @@ def test_a_stated_foot_goes_before_the_nearest_one():
     np.testing.assert_allclose(loads.force[first, 1], plain.force[first, 0])
     later = loads.time > 1.3
     np.testing.assert_allclose(loads.force[later], plain.force[later])
-    assert [(one.code, one.where.plate, one.where.span_s) for one in findings] == [("P286", plate, (0.1, 0.9))]
+    assert [(reported.code, reported.where.plate, reported.where.span_s) for reported in findings] == [
+        ("P286", plate, (0.1, 0.9))
+    ]
 
 
 def test_a_load_that_is_stated_to_be_of_no_foot_is_not_used():

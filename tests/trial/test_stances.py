@@ -30,10 +30,10 @@ WALK = trial([(0.5, 1.1), (1.5, 2.1)], [(0.0, 0.6), (1.0, 1.6), (2.0, 2.6)])
 
 
 def test_stances_have_their_times_and_those_cut_by_the_record_take_as_long_as_others():
-    found = [(one.side, one.number, one.start_s, one.end_s, one.whole) for one in stances_of(WALK)]
+    found = [(stance.side, stance.number, stance.start_s, stance.end_s, stance.whole) for stance in stances_of(WALK)]
     assert found[:2] == [("r", 1, 0.5, 1.1, True), ("r", 2, 1.5, 2.1, True)]
     cut = trial([(0.5, 1.1), (2.7, 3.0)], [(0.0, 0.2)])
-    assert [(one.side, one.whole) for one in stances_of(cut)] == [("r", True), ("r", False), ("l", False)]
+    assert [(stance.side, stance.whole) for stance in stances_of(cut)] == [("r", True), ("r", False), ("l", False)]
     assert stances_of(cut)[1].end_s == pytest.approx(3.3)
     assert stances_of(cut)[2].start_s == pytest.approx(-0.4)
 
@@ -42,8 +42,8 @@ def test_contacts_of_plates_are_not_rounded_to_frames():
     fine = np.arange(0.0, 3.0, 0.001)
     force = np.zeros((len(fine), 2, 3))
     force[(fine >= 0.4965) & (fine < 1.1035), 0, 1] = 500.0
-    one = replace(WALK, loads=FootLoads(fine, force, np.zeros_like(force)))
-    first, second, *_ = stances_of(one)
+    walk = replace(WALK, loads=FootLoads(fine, force, np.zeros_like(force)))
+    first, second, *_ = stances_of(walk)
     assert (first.start_s, first.end_s) == pytest.approx((0.497, 1.103))
     assert (second.start_s, second.end_s) == (1.5, 2.1), "without a plate"
 
@@ -90,7 +90,7 @@ def test_a_phase_of_which_a_tenth_is_unknown_is_not_missing():
 
 def test_parts_of_several_stances_and_trials_add_up():
     both = [leg_coverage(WALK, known([(0.5, 0.9)])), leg_coverage(WALK, known([(1.85, 2.1)]))]
-    assert [one[0].missing for one in both] == [("push-off",), ("loading response", "mid-stance")]
+    assert [coverage[0].missing for coverage in both] == [("push-off",), ("loading response", "mid-stance")]
     right, left = joined_coverage(both)
     assert (right.missing, left.none) == ((), True)
     assert right.to_dict() == {"stride_percent": [[0, 40]], "stance_percent": [[0, 100]], "missing": []}

@@ -26,7 +26,7 @@ def given(request, file_of):
     """Name, and what is found of its files, where one of them may be given as the static trial."""
 
     def check(static=None):
-        wanted = [RecordingFiles(file_of(one)) for one in WALKS[request.param]]
+        wanted = [RecordingFiles(file_of(name)) for name in WALKS[request.param]]
         chosen = None if static is None else wanted[static].markers
         return check_person(read_files(wanted, Person(Subject(name="A"), ()), chosen))
 
@@ -36,16 +36,18 @@ def given(request, file_of):
 def test_who_stands_still_is_the_static_trial(given):
     name, check = given
     found = check()
-    assert [one.context.is_static for one in found.recordings] == [True, False]
-    assert [one.context.name for one in found.recordings] == [WALKS[name][k].split("/")[1][:-4] for k in (1, 0)]
-    assert "S201" not in [one.code for one in found.findings]
-    assert not [one for one in found.findings if one.severity is Severity.ERROR]
+    assert [recording.context.is_static for recording in found.recordings] == [True, False]
+    assert [recording.context.name for recording in found.recordings] == [
+        WALKS[name][k].split("/")[1][:-4] for k in (1, 0)
+    ]
+    assert "S201" not in [finding.code for finding in found.findings]
+    assert not [finding for finding in found.findings if finding.severity is Severity.ERROR]
 
 
 def test_a_walk_given_as_the_static_trial(given):
     name, check = given
     found = check(static=0)
-    (walks,) = [one for one in found.findings if one.code == "S201"]
+    (walks,) = [finding for finding in found.findings if finding.code == "S201"]
     assert walks.severity is Severity.WARNING
     assert walks.where.trial == WALKS[name][0].split("/")[1][:-4]
     assert walks.evidence["distance_m"].value == pytest.approx(FAR_M[name], abs=0.05)
@@ -60,8 +62,8 @@ def test_files_and_options_of_a_fit_are_judged_alike(file_of, name):
     fitted = check_person(read_person(subject_from_options(options)))
     wanted = files_by_name([walk, static], static=static)
     checked = check_person(read_files(wanted, Person(Subject(name="A", **stated), ()), static))
-    assert [one.to_dict() for one in checked.findings] == [one.to_dict() for one in fitted.findings]
-    assert "S111" in [one.code for one in checked.findings], "60 kg are stated"
+    assert [finding.to_dict() for finding in checked.findings] == [finding.to_dict() for finding in fitted.findings]
+    assert "S111" in [finding.code for finding in checked.findings], "60 kg are stated"
 
 
 def test_forces_that_are_given_go_with_the_only_markers(tmp_path):

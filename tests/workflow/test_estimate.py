@@ -51,7 +51,7 @@ def test_total_mass_is_the_scale_s_or_a_warning_says_why(fit_of, name):
     mass = summary["total_mass_kg"]
     assert mass["literature"] == pytest.approx(mass["measured"], rel=1e-6)
     off = abs(mass["estimate"] / mass["measured"] - 1) > 0.03
-    assert ("S113" in [one["code"] for one in summary["findings"]]) == off
+    assert ("S113" in [finding["code"] for finding in summary["findings"]]) == off
 
 
 @walks
@@ -89,14 +89,14 @@ def test_an_impossible_body_is_warned_about(fit_of, name):
     moments = {p: table["estimate"][table["parameter"] == p] for p in ("ixx", "iyy", "izz")}
     largest = np.maximum.reduce(list(moments.values()))
     impossible = int((2 * largest > sum(moments.values())).sum())
-    found = [one["evidence"]["count"]["value"] for one in fit.summary["findings"] if one["code"] == "R202"]
+    found = [finding["evidence"]["count"]["value"] for finding in fit.summary["findings"] if finding["code"] == "R202"]
     assert found == ([impossible] if impossible else [])
 
 
 def test_mass_and_height_come_from_the_c3d_file(short_fit):
     assert short_fit.subject.mass_kg == pytest.approx(72.6, abs=0.1)
     assert short_fit.subject.height_m == pytest.approx(1.803, abs=0.001)
-    assert "S103" not in [one.code for one in short_fit.findings]
+    assert "S103" not in [finding.code for finding in short_fit.findings]
 
 
 def test_several_trials_share_one_body(short_fit):
@@ -147,7 +147,7 @@ def test_settings_and_subject_reach_the_result(c3d_lab, short_fit):
         progress=lambda stage, share: shares.append((stage, share)),
     )
     assert fit.literature.total_mass_kg == pytest.approx(77.0)
-    (found,) = [one for one in fit.findings if one.code == "S103"]
+    (found,) = [finding for finding in fit.findings if finding.code == "S103"]
     assert found.severity.name == "WARNING"
     values = [found.evidence[name].value for name in ("quantity", "stated", "filed", "files")]
     assert values == ["mass", 77.0, pytest.approx(72.6, abs=0.1), "static, walk"]

@@ -52,5 +52,5 @@ def test_a_prosthesis_is_no_mirror_image(c3d_lab):
     with pytest.raises(SettingsError, match=r"shank_l: a prosthesis does not mirror .* symmetry = false"):
         prepare_subject(with_settings(wanted, method="two-level"))
     two_level = prepare_subject(with_settings(wanted, method="two-level", symmetry=False))
-    (unused,) = [one for one in two_level.findings if one.code == "F194"]
+    (unused,) = [finding for finding in two_level.findings if finding.code == "F194"]
     assert "[segment]" in unused.evidence["entry"].value

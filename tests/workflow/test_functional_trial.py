@@ -44,9 +44,11 @@ def off_deg(fit) -> dict[str, tuple[float, float]]:
     """Per knee, by how much the estimated axis misses the true one, and the deviation of one of its two angles."""
     result = {}
     for side in "rl":
-        found = [one for one in fit.posterior.calibration if one.joint == f"knee_{side}" and one.quantity == AXIS]
-        away = [np.degrees(one.value) - TILTS_DEG[f"knee_tilt_{one.axis}_{side}"] for one in found]
-        result[side] = float(np.hypot(*away)), float(np.degrees(max(one.sd for one in found)))
+        found = [
+            entry for entry in fit.posterior.calibration if entry.joint == f"knee_{side}" and entry.quantity == AXIS
+        ]
+        away = [np.degrees(entry.value) - TILTS_DEG[f"knee_tilt_{entry.axis}_{side}"] for entry in found]
+        result[side] = float(np.hypot(*away)), float(np.degrees(max(entry.sd for entry in found)))
     return result
 
 
@@ -65,8 +67,8 @@ def fit(lab):
 
 def test_its_markers_alone_count(fit):
     assert [trial.name for trial in fit.trials] == ["walk"]
-    assert [one.where.trial for one in fit.findings if one.code == "P280"] == ["squat"]
-    assert not [one for one in fit.posterior.calibration if one.trial == "squat"]
+    assert [finding.where.trial for finding in fit.findings if finding.code == "P280"] == ["squat"]
+    assert not [entry for entry in fit.posterior.calibration if entry.trial == "squat"]
     assert not fit.left_out
     assert fit.converged
     assert fit.overview.line.endswith("the trial was used, and the markers of one more.")
@@ -104,9 +106,9 @@ def test_forces_of_such_a_trial_are_not_used(lab):
     measured, _ = lab
     again = replace(measured.walk, name="again")
     ready = prepare(SUBJECT, measured.static, [TrialInput(measured.walk), TrialInput(again, use="kinematics")])
-    assert [one.trial.name for one in ready.functional] == ["again"]
+    assert [trial.trial.name for trial in ready.functional] == ["again"]
     assert ready.functional[0].trial.loads.plates == ()
-    assert [one.trial.name for one in ready.kinematics] == ["walk"]
+    assert [trial.trial.name for trial in ready.kinematics] == ["walk"]
 
 
 def with_empty_plates(recording, name):
@@ -119,13 +121,13 @@ def test_a_trial_whose_forces_are_refused_gives_its_markers(lab):
     inputs = [TrialInput(measured.walk), TrialInput(with_empty_plates(measured.walk, "empty"))]
     screened = screen(Person(SUBJECT, inputs, measured.static))
     assert screened.left_out == ("empty",)
-    assert [one.name for one in screened.usable] == ["walk", "empty"]
-    assert [(one.where.trial, one.severity.name) for one in screened.findings if one.code == "P283"] == [
-        ("empty", "INFO")
-    ]
+    assert [trial.name for trial in screened.usable] == ["walk", "empty"]
+    assert [
+        (finding.where.trial, finding.severity.name) for finding in screened.findings if finding.code == "P283"
+    ] == [("empty", "INFO")]
     ready = prepared(screened, Settings())
-    assert [one.trial.name for one in ready.kinematics] == ["walk"]
-    assert [one.trial.name for one in ready.functional] == ["empty"]
+    assert [trial.trial.name for trial in ready.kinematics] == ["walk"]
+    assert [trial.trial.name for trial in ready.functional] == ["empty"]
     assert ready.left_out == ("empty",)
     assert check_person(screened.person).overview.line.endswith("1 of 2 trials was used, and the markers of one more.")
 
@@ -144,8 +146,8 @@ def test_its_markers_must_be_sound(lab):
     mirrored = [other.get(label[0], label[0]) + label[1:] if label[1] == "." else label for label in markers.labels]
     swapped = replace(with_empty_plates(measured.walk, "empty"), markers=replace(markers, labels=tuple(mirrored)))
     screened = screen(Person(SUBJECT, [TrialInput(measured.walk), TrialInput(swapped)], measured.static))
-    assert [one.name for one in screened.usable] == ["walk"]
-    assert not [one for one in screened.findings if one.code == "P283"]
+    assert [trial.name for trial in screened.usable] == ["walk"]
+    assert not [finding for finding in screened.findings if finding.code == "P283"]
 
 
 @pytest.mark.parametrize("window_s", [(200.0, 260.0), (1.0, 1.04)])
@@ -153,7 +155,9 @@ def test_a_window_with_hardly_any_of_its_frames_leaves_it_out(lab, window_s):
     measured, squats = lab
     inputs = [TrialInput(measured.walk), TrialInput(squats, window_s, use="kinematics")]
     checked = check_person(Person(SUBJECT, inputs, measured.static))
-    (found,) = [one for one in checked.findings if one.where.trial == "squat" and one.severity.name == "ERROR"]
+    (found,) = [
+        finding for finding in checked.findings if finding.where.trial == "squat" and finding.severity.name == "ERROR"
+    ]
     assert (found.code, found.evidence["key"].value) == ("F191", "window_s")
     assert checked.overview.line.endswith("1 of 2 trials was used.")
     ready = prepare(SUBJECT, measured.static, inputs)
@@ -168,7 +172,9 @@ def test_check_and_fit_say_alike_that_it_is_too_short(lab, frames):
     checked = check_person(Person(SUBJECT, inputs, measured.static))
     ready = prepare(SUBJECT, measured.static, inputs)
     for findings in (checked.findings, ready.findings):
-        (found,) = [one for one in findings if one.where.trial == "squat" and one.severity.name == "ERROR"]
+        (found,) = [
+            finding for finding in findings if finding.where.trial == "squat" and finding.severity.name == "ERROR"
+        ]
         assert (found.code, found.evidence["frames"].value) == ("T104", frames)
     assert ready.left_out == ("squat",)
 
@@ -191,7 +197,7 @@ def test_the_example_of_the_docs(lab, tmp_path):
     path = tmp_path / "lab" / "functional.toml"
     path.write_text(example)
     ready = prepare_subject(path)
-    assert [one.trial.name for one in ready.functional] == ["squats"]
+    assert [trial.trial.name for trial in ready.functional] == ["squats"]
     assert set(LEG_AXIS_TILTS) <= set(ready.uncertainty.axes)
 
 
@@ -203,10 +209,10 @@ def test_axes_and_their_deviations_hold_over_people():
         measured, squats = recorded(seed)
         inputs = [TrialInput(measured.walk), TrialInput(squats, use="kinematics")]
         found = estimate(prepare(SUBJECT, measured.static, inputs, Settings())).posterior.calibration
-        for one in found:
-            name = f"knee_tilt_{one.axis}_{str(one.joint)[-1]}"
-            if one.quantity == AXIS and name in TILTS_DEG and str(one.joint).startswith("knee"):
-                misses.append(np.degrees(one.value) - TILTS_DEG[name])
-                pulls.append(misses[-1] / np.degrees(one.sd))
+        for entry in found:
+            name = f"knee_tilt_{entry.axis}_{str(entry.joint)[-1]}"
+            if entry.quantity == AXIS and name in TILTS_DEG and str(entry.joint).startswith("knee"):
+                misses.append(np.degrees(entry.value) - TILTS_DEG[name])
+                pulls.append(misses[-1] / np.degrees(entry.sd))
     assert np.sqrt(np.mean(np.square(misses))) < 1.5
     assert np.sqrt(np.mean(np.square(pulls))) < 1.3

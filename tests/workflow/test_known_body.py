@@ -29,7 +29,7 @@ def ready():
 
 def sources(ready):
     """What the prior also uses."""
-    return [one.evidence["source"].value for one in ready.findings if one.code == "S408"]
+    return [finding.evidence["source"].value for finding in ready.findings if finding.code == "S408"]
 
 
 def informed(ready, settings=None, earlier=None, **segments):
@@ -48,17 +48,17 @@ def test_warnings_name_the_prior_where_more_is_known(ready):
 def test_a_measured_mass_weighs_by_how_well_it_is_known(ready):
     before = ready.prior
     row = before.mean.segments.index("thigh_r")
-    expected, own = before.mean.mass_kg[row], before.sd[row, 0]
-    after = informed(ready, thigh_r=KnownSegment(mass_kg=f"{expected + own} +- {own}", source="DXA"))
-    assert after.prior.mean.mass_kg[row] == pytest.approx(expected + own / 2)
-    assert after.prior.sd[row, 0] == pytest.approx(own / np.sqrt(2.0))
+    expected, sd = before.mean.mass_kg[row], before.sd[row, 0]
+    after = informed(ready, thigh_r=KnownSegment(mass_kg=f"{expected + sd} +- {sd}", source="DXA"))
+    assert after.prior.mean.mass_kg[row] == pytest.approx(expected + sd / 2)
+    assert after.prior.sd[row, 0] == pytest.approx(sd / np.sqrt(2.0))
     (source,) = sources(after)
     assert "thigh_r mass" in source
     assert "DXA" in source
-    assert [one.code for one in after.findings] == ["S408"]
+    assert [finding.code for finding in after.findings] == ["S408"]
     left = before.mean.segments.index("thigh_l")
     moved = after.prior.mean.mass_kg[left] - before.mean.mass_kg[left]
-    assert moved == pytest.approx(0.9 * own / 2)
+    assert moved == pytest.approx(0.9 * sd / 2)
 
 
 def test_several_measurements_are_those_of_the_information_form(ready):
@@ -83,7 +83,7 @@ def test_several_measurements_are_those_of_the_information_form(ready):
 def test_a_value_far_from_the_tables_is_warned_about(ready):
     """Grams for kilograms."""
     after = informed(ready, foot_r=KnownSegment(mass_kg="900 +- 10"))
-    (found,) = [one for one in after.findings if one.code == "S402"]
+    (found,) = [finding for finding in after.findings if finding.code == "S402"]
     assert (found.severity.name, found.where.part, found.evidence["stated"].value) == ("WARNING", "foot_r mass", 900.0)
     expected = ready.prior.mean.mass_kg[ready.prior.mean.segments.index("foot_r")]
     assert found.evidence["expected"].value == pytest.approx(expected)

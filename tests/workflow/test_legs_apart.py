@@ -42,7 +42,7 @@ def test_moments_of_the_leg_on_its_plate_alone(fit, tmp_path):
     with_walk, result = fit
     squat = result.trials[0]
     assert not squat.kinematics.complete
-    (found,) = [one for one in result.findings if one.code == "P290"]
+    (found,) = [finding for finding in result.findings if finding.code == "P290"]
     assert found.where.trial == "squat"
     curves = squat.joint_curves
     joints = curves.joints["estimate"]

@@ -91,11 +91,11 @@ def test_the_body_is_the_lighter_the_heavier_what_was_weighed_with_it():
     prior = with_attached(ready(pack)).prior
     body = np.zeros(len(prior.covariance))
     body[:120:10] = 1.0
-    own = body[:120] @ before.prior.covariance @ body[:120]
-    assert body @ prior.covariance @ body == pytest.approx(own + (0.15 * MASS_KG) ** 2)
+    body_variance = body[:120] @ before.prior.covariance @ body[:120]
+    assert body @ prior.covariance @ body == pytest.approx(body_variance + (0.15 * MASS_KG) ** 2)
     both = body.copy()
     both[120] = 1.0
-    assert both @ prior.covariance @ both == pytest.approx(own), "the total is as well known as before"
+    assert both @ prior.covariance @ both == pytest.approx(body_variance), "the total is as well known as before"
     _, weighed = prior.given_scale()
     assert weighed[120, 120] > (0.14 * MASS_KG) ** 2, "the scale does not tell them apart"
     assert np.linalg.eigvalsh(prior.covariance / np.outer(*[prior.sd.ravel()] * 2))[0] > 0
@@ -123,11 +123,11 @@ def test_a_welded_segment_moves_as_the_torso_does():
     torso, pack = (bsp.segments.index(name) for name in ("torso", "rucksack"))
     rows = bsp.dynamic_parameters().reshape(-1, 10)
     rows[torso] += rows[pack]
-    one = BodySegmentParameters.from_dynamic_parameters(bsp.segments[:-1], rows[:-1])
+    welded = BodySegmentParameters.from_dynamic_parameters(bsp.segments[:-1], rows[:-1])
     wrench = trial.foot_loads.sum(axis=1)
     np.testing.assert_allclose(
         residual(after.skeleton, bsp, trial.motion, wrench),
-        residual(trial.skeleton, one, trial.motion, wrench),
+        residual(trial.skeleton, welded, trial.motion, wrench),
         atol=1e-8,
     )
 
@@ -160,7 +160,7 @@ def test_an_unknown_mass_is_found_within_its_error_bar_and_moments_are_better_fo
             inverse_dynamics(skeleton, bsp, trial.motion.cut(at), trial.foot_loads[at])
             for bsp in (trial.bsp, result.bsp, prior.mean)
         ]
-        moments.append([np.sqrt(np.mean(np.square(one - torque[0]))) for one in torque[1:]])
+        moments.append([np.sqrt(np.mean(np.square(moment - torque[0]))) for moment in torque[1:]])
     assert np.abs(away).max() < 3.0
     assert np.sqrt(np.mean(np.square(errors))) < 1.5, "beside 11 kg of prior deviation"
     after, before = np.mean(moments, axis=0)
@@ -262,15 +262,15 @@ def test_plates_that_agree_are_not_scaled_to_it(prior, trial):
 def test_else_the_stated_mass_is_kept(prior):
     ignored = replace(contradiction(), status="ignored")
     waived = replace(contradiction(severity=Severity.ERROR), status="waived")
-    for one in (contradiction(1), ignored, waived, contradiction().muted("P281")):
-        assert with_doubted_mass(prior, [one]) is prior
+    for doubted in (contradiction(1), ignored, waived, contradiction().muted("P281")):
+        assert with_doubted_mass(prior, [doubted]) is prior
     assert with_doubted_mass(prior, []) is prior
 
 
 def gains(*values, sd=0.02, trial="walk"):
     """Gain errors of plates in a trial, and those of all trials that it leaves undecided."""
     of_plates = {"kind": "plate", "quantity": GAIN, "unit": "1"}
-    own = [
+    of_trials = [
         CalibrationEntry(plate=f"plate {k}", trial=trial, value=value, prior_sd=0.018, sd=sd, **of_plates)
         for k, value in enumerate(values)
     ]
@@ -278,7 +278,7 @@ def gains(*values, sd=0.02, trial="walk"):
         CalibrationEntry(plate=f"plate {k}", value=value / 4, prior_sd=0.007, sd=0.03, **of_plates)
         for k, value in enumerate(values)
     ]
-    return lasting + own
+    return lasting + of_trials
 
 
 @pytest.mark.parametrize("values", [(-0.0764, -0.107), (0.065, 0.066), (-0.05, -0.08, -0.06)])

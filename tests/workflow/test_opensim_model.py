@@ -53,7 +53,7 @@ def without(recording, labels):
 
 
 def of_code(ready, code):
-    return [one for one in ready.findings if one.code == code]
+    return [finding for finding in ready.findings if finding.code == code]
 
 
 @contextmanager
@@ -71,9 +71,12 @@ def blocked(code):
 def test_what_no_marker_shows_is_locked_at_its_default_and_said(prepared, model):
     assert prepared.skeleton.locked == {"mtp_angle_r": 0.0, "mtp_angle_l": 0.0}
     found = of_code(prepared, "O412")
-    assert [(one.where.part, one.evidence["value"].value) for one in found] == [("mtp_angle_r", 0), ("mtp_angle_l", 0)]
-    for one in found:
-        expect_filled(one)
+    assert [(finding.where.part, finding.evidence["value"].value) for finding in found] == [
+        ("mtp_angle_r", 0),
+        ("mtp_angle_l", 0),
+    ]
+    for reported in found:
+        expect_filled(reported)
 
 
 def test_a_default_other_than_zero_is_kept(model, walk):
@@ -109,12 +112,12 @@ def test_light_bodies_are_held_and_all_are_kept(prepared, model):
     assert prepared.uncertainty.fixed.segments == (*light, "hand_r", "hand_l")
     assert set(prepared.prior.mean.segments) | set(prepared.uncertainty.fixed.segments) == set(model.bsp.segments)
     found = of_code(prepared, "O413")
-    assert tuple(one.where.part for one in found) == prepared.uncertainty.fixed.segments
-    masses = [one.evidence["mass_kg"].value for one in found]
+    assert tuple(finding.where.part for finding in found) == prepared.uncertainty.fixed.segments
+    masses = [finding.evidence["mass_kg"].value for finding in found]
     assert masses == pytest.approx(prepared.uncertainty.fixed.mass_kg)
     assert max(masses) < 0.5
-    for one in found:
-        expect_filled(one)
+    for reported in found:
+        expect_filled(reported)
     assert prepared.prior.mass_kg + prepared.uncertainty.fixed_kg == pytest.approx(72.6)
 
 
@@ -224,7 +227,7 @@ def test_a_model_without_feet(model, walk):
     with pytest.raises(BlockedError) as stopped:
         prepare(SUBJECT, footless, [TrialInput(walk)])
     found = stopped.value.blocking
-    assert [(one.code, one.where.part) for one in found] == [("O107", "right foot"), ("O107", "left foot")]
+    assert [(finding.code, finding.where.part) for finding in found] == [("O107", "right foot"), ("O107", "left foot")]
     expect_evidence(found[0], expected="calcn_r")
     assert found[0].where.file == "users.osim"
 
@@ -264,21 +267,21 @@ def test_inertias_too_small_for_the_mass_are_said(model, walk, prepared):
     assert not of_code(prepared, "O203")
     small = replace(model, bsp=replace(model.bsp, inertia_kgm2=0.1 * model.bsp.inertia_kgm2))
     found = of_code(prepare(SUBJECT, small, [TrialInput(walk)]), "O203")
-    assert "femur_r" in [one.where.part for one in found]
-    for one in found:
-        assert one.severity is Severity.WARNING
-        assert one.evidence["density_kg_m3"].value > one.evidence["density_kg_m3"].limit
+    assert "femur_r" in [finding.where.part for finding in found]
+    for finding in found:
+        assert finding.severity is Severity.WARNING
+        assert finding.evidence["density_kg_m3"].value > finding.evidence["density_kg_m3"].limit
 
 
 def test_joints_that_do_not_mirror_each_other_are_said(model, walk, prepared):
-    assert not [one for one in prepared.findings if one.code.startswith("O30")]
+    assert not [finding for finding in prepared.findings if finding.code.startswith("O30")]
     joints = tuple(
         replace(j, translation=j.translation + np.array([0.03, 0.0, 0.0])) if j.child == "talus_r" else j
         for j in model.skeleton.joints
     )
     moved = replace(model, skeleton=replace(model.skeleton, joints=joints))
     ready = prepare(SUBJECT, moved, [TrialInput(walk)])
-    (found,) = [one for one in ready.findings if one.code.startswith("O30")]
+    (found,) = [finding for finding in ready.findings if finding.code.startswith("O30")]
     assert (found.code, found.severity) == ("O303", Severity.WARNING)
     assert (found.evidence["right"].value, found.evidence["left"].value) == ("talus_r", "talus_l")
     assert found.evidence["distance_m"].value == pytest.approx(0.03, abs=0.001)

@@ -36,6 +36,6 @@ def measured_in(trial: Trial, name: str, *spans: tuple[int, int]) -> RotatedTria
 def test_findings_are_those_of_all_trials(skeleton, trial):
     trials = [measured_in(trial, "parted", (0, 45), (55, FRAMES)), measured_in(trial, "brief", (40, 44))]
     solved = solved_trials(skeleton, trials, 10.0, 0.0, lambda stage, share: None)
-    assert [one.trial.name for one in solved.kinematics] == ["parted"]
-    found = [(one.code, one.where.trial) for one in solved.findings if one.rule.question != "O31"]
+    assert [solved_trial.trial.name for solved_trial in solved.kinematics] == ["parted"]
+    found = [(finding.code, finding.where.trial) for finding in solved.findings if finding.rule.question != "O31"]
     assert found == [("P270", "parted"), ("P279", "brief")]

@@ -28,8 +28,8 @@ def shown(skeleton, prior, recorded) -> InstrumentInformation:
 
 def together(said) -> tuple[np.ndarray, np.ndarray]:
     """Values and deviations of all plates' errors, each with what all plates have in common, and of the delay."""
-    (plates,) = {one.plates for one in said}
-    information, rhs = sum(one.information for one in said), sum(one.rhs for one in said)
+    (plates,) = {information_of_trial.plates for information_of_trial in said}
+    information, rhs = sum(shown_.information for shown_ in said), sum(shown_.rhs for shown_ in said)
     prior = GaussianPrior.given(InstrumentPrior().of_unknowns(plates), information, rhs)
     covariance = np.linalg.inv(information + prior.precision)
     to_plates = np.zeros((len(PLATE_UNKNOWNS) * len(plates) + 1, len(rhs)))
@@ -47,10 +47,10 @@ def test_single_trials_pooled_agree_with_one_estimate_from_all(gain):
     person = replace(subject, bsp=prior.draw(np.random.default_rng(1)))
     trials = [walk(person, 1.5, trapezoid=False), *(MOTIONS[name](person) for name in ("walk", "fast walk"))]
     skeleton, recorded = measured(trials, Faults("artefact", gain=gain), np.random.default_rng(2))
-    single = [shown(skeleton, prior, [one]) for one in recorded]
+    single = [shown(skeleton, prior, [recorded_walk]) for recorded_walk in recorded]
     value, _ = together(single)
     expected, _ = together([shown(skeleton, prior, recorded)])
-    alone = np.mean([together([one])[1] for one in single], axis=0)
+    alone = np.mean([together([of_walk])[1] for of_walk in single], axis=0)
     away = np.abs(value - expected) / alone
     assert away.max() < 0.5, away.round(2)
     right = GAIN  # the right foot's plate comes first

@@ -45,7 +45,7 @@ def test_markers_that_calibration_moves_far_are_reported(recordings):
     positions = static.markers.positions + np.where(np.array(static.markers.labels) == "RSHO", 0.08, 0.0)[:, None]
     raised = replace(static, markers=replace(static.markers, positions=positions))
     ready = prepared_from(raised, TrialInput(walk, (1.2, 1.9)))
-    found = {one.where.markers: one for one in ready.findings if one.code == "M173"}
+    found = {reported.where.markers: reported for reported in ready.findings if reported.code == "M173"}
     assert ("RSHO",) in found
     assert found["RSHO",].severity is Severity.INFO
     assert 0.03 < found["RSHO",].evidence["distance_m"].value < 0.14
@@ -54,10 +54,10 @@ def test_markers_that_calibration_moves_far_are_reported(recordings):
 def test_a_head_beside_four_markers_of_the_trunk_is_left_out_and_named(recordings):
     static, walk = recordings
     ready = prepared_from(static, TrialInput(walk, (1.2, 1.9)))
-    (one,) = (each for each in ready.findings if each.code == "M174")
-    assert set(one.where.markers) == {"RFHD", "LFHD", "RBHD", "LBHD"}
-    assert not set(one.where.markers) & set(ready.skeleton.labels)
-    assert not set(one.where.markers) & set(ready.kinematics[0].ik.labels)
+    (reported,) = (found_finding for found_finding in ready.findings if found_finding.code == "M174")
+    assert set(reported.where.markers) == {"RFHD", "LFHD", "RBHD", "LBHD"}
+    assert not set(reported.where.markers) & set(ready.skeleton.labels)
+    assert not set(reported.where.markers) & set(ready.kinematics[0].ik.labels)
 
 
 def test_a_range_that_the_user_states_is_the_models_and_is_named(recordings):
@@ -67,7 +67,10 @@ def test_a_range_that_the_user_states_is_the_models_and_is_named(recordings):
     knee, elbow = (ready.skeleton.ranges[name] for name in subject.ranges_deg)
     assert (np.degrees(knee.low), knee.clamped, knee.stated) == (pytest.approx(-20.0), False, True)
     assert (np.degrees(elbow.low), elbow.clamped, elbow.stated) == (pytest.approx(-12.0), True, True)
-    assert [one.where.part for one in ready.findings if one.code == "S411"] == ["knee_angle_r", "elbow_flex_l"]
+    assert [reported.where.part for reported in ready.findings if reported.code == "S411"] == [
+        "knee_angle_r",
+        "elbow_flex_l",
+    ]
 
 
 def test_a_range_of_no_coordinate_is_refused(recordings):

@@ -36,7 +36,7 @@ def marker_set(lab):
 def codes(check, *severities):
     """Of open findings of these severities; of WARNINGs and ERRORs if none is given."""
     wanted = severities or (Severity.WARNING, Severity.ERROR)
-    return [one.code for one in check.findings if one.is_open and one.severity in wanted]
+    return [finding.code for finding in check.findings if finding.is_open and finding.severity in wanted]
 
 
 def errors(check):
@@ -44,7 +44,7 @@ def errors(check):
 
 
 def of_code(check, code):
-    return [one for one in check.findings if one.code == code]
+    return [finding for finding in check.findings if finding.code == code]
 
 
 def moved(recording, positions):
@@ -69,7 +69,7 @@ def test_a_good_laboratory(lab, marker_set):
     assert walked.context.force_mass.mass_kg == pytest.approx(72.6, rel=0.02)
     (start, end), *_ = walked.windows
     assert dict(walked.facts())["complete contact"].startswith(f"{start:.3f} to {end:.3f} s")
-    assert [one.share for one in walked.markers] == [1.0] * len(walked.markers)
+    assert [marker.share for marker in walked.markers] == [1.0] * len(walked.markers)
 
 
 def test_facts_say_what_is_in_it(lab, marker_set):
@@ -115,7 +115,7 @@ def test_labels_in_other_capitals_and_punctuation_are_known(lab, marker_set):
     folded = tuple(label.replace(".", "_").lower() for label in markers.labels)
     check = check_recording(replace(lab.walk, markers=replace(markers, labels=folded)))
     assert check.marker_set.name == marker_set.name
-    read = {one.evidence["written"].value: one.evidence["label"].value for one in of_code(check, "L103")}
+    read = {finding.evidence["written"].value: finding.evidence["label"].value for finding in of_code(check, "L103")}
     assert read == {written: label for written, label in zip(folded, markers.labels, strict=True) if written != label}
     assert codes(check) == []
     assert check.windows == check_recording(lab.walk).windows
@@ -151,7 +151,7 @@ def test_never_seen_and_gaps(lab, marker_set):
     positions[(time > start) & (time < start + 0.9 * (end - start)), column("Sternum")] = np.nan
     check = check_recording(moved(lab.walk, positions), marker_set)
     found = {code: of_code(check, code) for code in ("M101", "M102", "M103")}
-    assert {code: [one.where.markers for one in each] for code, each in found.items()} == {
+    assert {code: [finding.where.markers for finding in findings] for code, findings in found.items()} == {
         "M101": [("R.Heel",)],
         "M102": [("Sternum",)],
         "M103": [("L.Elbow",)],
@@ -166,15 +166,15 @@ def test_gap_outside_the_measured_window_does_no_harm(lab, marker_set):
     positions[lab.walk.markers.time < start - 0.05, lab.walk.markers.labels.index("Sternum")] = np.nan
     check = check_recording(moved(lab.walk, positions), marker_set)
     assert codes(check, Severity.WARNING, Severity.ERROR) == []
-    assert not [one for one in check.findings if one.code.startswith("M10")]
-    (sternum,) = [one for one in check.markers if one.label == "Sternum"]
+    assert not [finding for finding in check.findings if finding.code.startswith("M10")]
+    (sternum,) = [marker for marker in check.markers if marker.label == "Sternum"]
     assert sternum.share < 1.0
 
 
 def mass_finding(recording, marker_set, mass_kg):
     """What is found of a stated mass: it is the person's, not the recording's."""
     person = Person(Subject(name="A", mass_kg=mass_kg), [TrialInput(recording)], marker_set=marker_set)
-    return [one for one in check_person(person).findings if one.code.startswith("S11")]
+    return [finding for finding in check_person(person).findings if finding.code.startswith("S11")]
 
 
 def test_no_forces_and_no_measured_frame(lab, marker_set):
@@ -193,7 +193,7 @@ def test_loads_that_are_nowhere_near_the_feet_are_not_said_to_be_on_the_wrong_fe
     spoilt = replace(lab.walk, plates=replace(plates, moment=1000.0 * plates.moment, corners=None))
     check = check_recording(spoilt, marker_set)
     assert errors(check) == ["P203", "P203"]
-    assert [one.where.plate for one in of_code(check, "P203")] == list(plates.names)
+    assert [finding.where.plate for finding in of_code(check, "P203")] == list(plates.names)
 
 
 def test_window_of_the_user(lab, marker_set):
@@ -225,8 +225,8 @@ def test_window_of_the_user(lab, marker_set):
 def test_mass_on_one_belt_is_that_of_two_plates(recording_of, name, over):
     """While both feet stand on it, the sum of their loads is known, which is all that weighs."""
     two = recording_of(f"{name}.trc", f"{name}_grf.mot")
-    one = on_one_plate(two)
-    by_two, by_one = (check_recording(recording).context.force_mass for recording in (two, one))
+    long_plate = on_one_plate(two)
+    by_two, by_one = (check_recording(recording).context.force_mass for recording in (two, long_plate))
     assert by_one.over == by_two.over == over
     assert by_one.mass_kg == pytest.approx(by_two.mass_kg, rel=0.005)
 
@@ -253,7 +253,7 @@ def test_sound_trials(recording_of, name):
     assert not errors(check)
     assert check.windows[0] == pytest.approx(window, abs=0.03)
     assert check.context.force_mass.mass_kg == pytest.approx(mass_kg, rel=0.065)
-    severities = [one.severity for one in mass_finding(recording, marker_set, mass_kg)]
+    severities = [finding.severity for finding in mass_finding(recording, marker_set, mass_kg)]
     assert severities == ([Severity.WARNING] if "subject_b" in name else [])
 
 
@@ -289,9 +289,13 @@ def assert_foreign(recording, unit, vertical):
 @pytest.mark.parametrize("vertical", ["+Y", "+Z"])
 def test_a_file_of_another_laboratory(of_another_laboratory, recording_of, unit, vertical):
     check = assert_foreign(read_recording(of_another_laboratory(unit, vertical)), unit, vertical)
-    own = check_recording(recording_of("synthetic/walk.c3d", None))
-    assert [plate.outside_share for plate in check.plates] == [plate.outside_share for plate in own.plates] == [0.0] * 2
-    assert [plate.peak_n for plate in check.plates] == pytest.approx([plate.peak_n for plate in own.plates])
+    renamed = check_recording(recording_of("synthetic/walk.c3d", None))
+    assert (
+        [plate.outside_share for plate in check.plates]
+        == [plate.outside_share for plate in renamed.plates]
+        == [0.0] * 2
+    )
+    assert [plate.peak_n for plate in check.plates] == pytest.approx([plate.peak_n for plate in renamed.plates])
 
 
 @pytest.mark.parametrize(

@@ -63,11 +63,11 @@ def test_another_spelling_is_read_as_the_static_trials(person, of_static, of_wal
     result = screened(static, walk)
     (trial,) = result.context.trials
     assert trial.recording.markers.labels == tuple(of_static(label) for label in person[1].markers.labels)
-    found = [one for one in result.findings if one.code == "L103" and one.where.trial == walk.name]
-    assert {(one.evidence["written"].value, one.evidence["label"].value) for one in found} >= {
+    found = [finding for finding in result.findings if finding.code == "L103" and finding.where.trial == walk.name]
+    assert {(finding.evidence["written"].value, finding.evidence["label"].value) for finding in found} >= {
         (of_walk(label), of_static(label)) for label in ("R.ASIS", "L.Heel")
     }
-    assert max(one.severity for one in result.findings) < Severity.ERROR
+    assert max(finding.severity for finding in result.findings) < Severity.ERROR
 
 
 @pytest.mark.parametrize("of_walk", [str.lower, "Walk_{}".format, lambda label: label.replace(".", " ")])
@@ -79,7 +79,7 @@ def test_another_spelling_is_read_as_the_models(recording_of, file_of, of_walk):
     result = screen(Person(Subject(name="anna", mass_kg=72.6), trials, model=model))
     read = result.context.trials[0].recording.markers.labels
     assert set(read) & set(model.skeleton.labels) == set(walk.markers.labels) & set(model.skeleton.labels)
-    assert max(one.severity for one in result.findings) < Severity.ERROR
+    assert max(finding.severity for finding in result.findings) < Severity.ERROR
 
 
 @pytest.mark.measured
@@ -90,8 +90,8 @@ def test_points_that_a_program_calculated_are_left_out_with_a_model(recording_of
     result = screen(Person(Subject(name="anna", mass_kg=62.6), (TrialInput(walk),), model=model))
     read = result.context.trials[0].recording.markers.labels
     assert set(walk.markers.labels) - set(read) == {"L_HJC", "R_HJC"}
-    found = [one for one in result.findings if one.code == "M151"]
-    assert [(one.where.markers, one.severity) for one in found] == [
+    found = [finding for finding in result.findings if finding.code == "M151"]
+    assert [(finding.where.markers, finding.severity) for finding in found] == [
         (("L_HJC",), Severity.CORRECTED),
         (("R_HJC",), Severity.CORRECTED),
     ]
@@ -101,7 +101,7 @@ def test_labels_of_another_set_stay_as_they_are(person):
     static, walk = person[0], spelled(person[1], lambda label: f"{len(label)}{label[::-1]}")
     result = screened(static, walk)
     assert result.context.trials[0].recording.markers.labels == walk.markers.labels
-    assert "L101" in [one.code for one in result.findings]
+    assert "L101" in [finding.code for finding in result.findings]
 
 
 def test_a_person_whose_labels_fit_keeps_the_marker_set_found(person):

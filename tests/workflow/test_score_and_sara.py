@@ -34,11 +34,11 @@ def score_and_sara(proximal, distal):
 
 def segment_poses(skeleton, markers, segment):
     """Rotations (n, 3, 3) and translations (n, 3) m of a segment by its markers alone, by least squares."""
-    own = [marker for marker in skeleton.markers if marker.segment == segment]
-    seen = markers.positions[:, [markers.labels.index(marker.label) for marker in own]]
-    places = np.array([marker.position for marker in own])
+    of_segment = [marker for marker in skeleton.markers if marker.segment == segment]
+    seen = markers.positions[:, [markers.labels.index(marker.label) for marker in of_segment]]
+    places = np.array([marker.position for marker in of_segment])
     middle = places.mean(axis=0)
-    turns = [Rotation.align_vectors(each - each.mean(axis=0), places - middle)[0].as_matrix() for each in seen]
+    turns = [Rotation.align_vectors(points - points.mean(axis=0), places - middle)[0].as_matrix() for points in seen]
     return np.array(turns), seen.mean(axis=1) - np.array(turns) @ middle
 
 
@@ -112,8 +112,8 @@ def hip_centre(skeleton, side):
     return pose.rotation[0, pelvis].T @ (pose.translation[0, thigh] - pose.translation[0, pelvis])
 
 
-def angle_deg(one, other):
-    return float(np.degrees(np.arccos(min(1.0, abs(one @ other)))))
+def angle_deg(axis, other):
+    return float(np.degrees(np.arccos(min(1.0, abs(axis @ other)))))
 
 
 def test_on_exact_markers_both_methods_are_exact():
@@ -142,7 +142,7 @@ def test_centres_and_axes_are_nearer_to_the_truth():
             off["our centre"].append(np.linalg.norm(hip_centre(fit.skeleton, side) - centre))
             off["SARA"].append(angle_deg(score_and_sara(thigh, shank)[1], axis))
             off["our axis"].append(angle_deg(knee_axis(fit.skeleton, side), axis))
-    rms = {name: np.sqrt(np.mean(np.square(each))) for name, each in off.items()}
+    rms = {name: np.sqrt(np.mean(np.square(distances))) for name, distances in off.items()}
     assert rms["our centre"] <= rms["SCoRE"]
     assert rms["our axis"] <= rms["SARA"]
     assert rms["our axis"] < 1.5

@@ -41,12 +41,12 @@ PEOPLE = [*FITTED, "synthetic with model", *(["subject4"] if is_here(f"{_SUBJECT
 """Names of `walks.WALKS`, the synthetic laboratory's, and two with their own OpenSim models."""
 
 
-FIELD = [one for one in cases(data_folder()) if one.arguments[0] == "fit"] if is_here(f"{_SUBJECT4}.trc") else []
+FIELD = [case for case in cases(data_folder()) if case.arguments[0] == "fit"] if is_here(f"{_SUBJECT4}.trc") else []
 
 
 def written(arguments):
     """The subject file of a command."""
-    words = [one for one in arguments if one != "--calibrate"]
+    words = [argument for argument in arguments if argument != "--calibrate"]
     given = dict(zip(words[1::2], words[2::2], strict=True))
     trial = {"markers": arguments[0], "forces": given.get("--forces"), "loads": given.get("--loads")}
     tables = {
@@ -81,8 +81,8 @@ def subject(request, tmp_path, synthetic_lab):
         text = osim_models.subject_file(synthetic_lab, WITH_MODEL, False)
     elif name == "subject4":
         person = osim_models.PEOPLE[name]
-        one = {_SUBJECT4: person.trials[_SUBJECT4]}
-        text = osim_models.subject_file(data_folder(), replace(person, trials=one), False)
+        trials = {_SUBJECT4: person.trials[_SUBJECT4]}
+        text = osim_models.subject_file(data_folder(), replace(person, trials=trials), False)
     else:
         text = written(fit_arguments(data_folder(), name))
     path = tmp_path / "subject.toml"
@@ -92,7 +92,7 @@ def subject(request, tmp_path, synthetic_lab):
 
 def screened(findings):
     """Code, severity and place of what is found before inverse kinematics."""
-    return [(one.code, one.severity, one.where) for one in findings if one.rule.stage in SCREENED]
+    return [(finding.code, finding.severity, finding.where) for finding in findings if finding.rule.stage in SCREENED]
 
 
 def test_check_and_fit_find_the_same(subject):
@@ -102,9 +102,9 @@ def test_check_and_fit_find_the_same(subject):
     assert screened(ready.findings) == found
     assert checked.overview.left_out == ready.left_out == ()
     assert ready.rules == checked.overview.rules
-    assert not [one for one in ready.findings if one.severity is Severity.ERROR]
-    for one in ready.findings:
-        expect_filled(one)
+    assert not [finding for finding in ready.findings if finding.severity is Severity.ERROR]
+    for finding in ready.findings:
+        expect_filled(finding)
 
 
 @pytest.mark.slow
@@ -122,8 +122,8 @@ def test_check_and_fit_find_the_same_in_recordings_of_other_laboratories(case, t
     except BlockedError as blocked:
         found = blocked.findings
     assert screened(found) == screened(checked.findings)
-    for one in (*found, *checked.findings):
-        expect_filled(one)
+    for finding in (*found, *checked.findings):
+        expect_filled(finding)
 
 
 def laboratory(folder, lab, trials, static="static"):
@@ -155,7 +155,9 @@ def test_what_the_readers_refuse_stands_though_it_is_waived(tmp_path, synthetic_
     write_trc(tmp_path / "other.trc", replace(markers, positions=turned))
     screened = screen(replace(read_person(wanted), overrule=Overrule(waive=("P201",))))
     assert screened.left_out == ("other",)
-    assert [(one.code, one.status) for one in screened.findings if one.where.trial == "other"] == [("P201", "open")]
+    assert [(finding.code, finding.status) for finding in screened.findings if finding.where.trial == "other"] == [
+        ("P201", "open")
+    ]
 
 
 def test_a_trial_that_is_left_out_is_so_by_both(tmp_path, synthetic_lab):
@@ -165,7 +167,11 @@ def test_a_trial_that_is_left_out_is_so_by_both(tmp_path, synthetic_lab):
     checked, ready = check_person(read_person(wanted)), prepare_subject(wanted)
     assert checked.overview.left_out == ready.left_out == ("alike", "other")
     assert screened(ready.findings) == screened(checked.findings)
-    errors = [(one.code, one.where.trial) for one in ready.findings if one.severity is Severity.ERROR and one.is_open]
+    errors = [
+        (finding.code, finding.where.trial)
+        for finding in ready.findings
+        if finding.severity is Severity.ERROR and finding.is_open
+    ]
     assert errors[1:] == [("P202", "other")]
     assert errors[0][0].startswith("F")
     assert errors[0][1] == "alike"
@@ -180,7 +186,10 @@ def test_what_blocks_a_fit_is_what_check_found(tmp_path, synthetic_lab):
     with pytest.raises(BlockedError) as blocked:
         prepare_subject(wanted)
     assert screened(blocked.value.findings) == screened(checked.findings)
-    assert [(one.code, one.where.trial) for one in blocked.value.blocking] == [("P202", "walk"), ("P202", "other")]
+    assert [(finding.code, finding.where.trial) for finding in blocked.value.blocking] == [
+        ("P202", "walk"),
+        ("P202", "other"),
+    ]
 
 
 def test_an_error_stops_unless_it_is_waived(tmp_path, synthetic_lab):
@@ -191,7 +200,9 @@ def test_an_error_stops_unless_it_is_waived(tmp_path, synthetic_lab):
     (found,) = blocked.value.blocking
     assert (found.code, found.where.trial) == ("S111", "walk")
     ready = prepare_subject(wanted, overrule=Overrule(waive=("S111",)))
-    assert [(one.code, one.status) for one in ready.findings if one.severity is Severity.ERROR] == [("S111", "waived")]
+    assert [(finding.code, finding.status) for finding in ready.findings if finding.severity is Severity.ERROR] == [
+        ("S111", "waived")
+    ]
 
 
 def test_a_static_trial_that_cannot_be_read_stops_everything(tmp_path, synthetic_lab):
@@ -216,7 +227,7 @@ def recording(name, **measurements):
 def widths(static, trials, **given):
     static_with_widths, marker_set = with_widths(static, trials, SET, Subject(name="A", **given))
     known = {joint: static_with_widths.measurements.get(name) for joint, name in marker_set.widths.items()}
-    borrowed = [(one.code, one.where.part, one.where.file) for one in static_with_widths.findings]
+    borrowed = [(finding.code, finding.where.part, finding.where.file) for finding in static_with_widths.findings]
     return {joint: value for joint, value in known.items() if value}, borrowed
 
 

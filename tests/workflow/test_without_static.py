@@ -21,9 +21,9 @@ from kinertia.workflow.screening import screen
 def ready(lab, static):
     subject = Subject(name="one", mass_kg=72.6, height_m=HEIGHT_M, sex="male")
     person = Person(subject, [TrialInput(read_recording(lab / "walk.c3d"))], static)
-    found = [one.to_dict() for one in check_person(person).findings if one.code == "S207"]
+    found = [finding.to_dict() for finding in check_person(person).findings if finding.code == "S207"]
     result = prepared(screen(person), Settings())
-    assert [one.to_dict() for one in result.findings if one.code == "S207"] == found
+    assert [finding.to_dict() for finding in result.findings if finding.code == "S207"] == found
     return result
 
 
@@ -34,18 +34,18 @@ def test_a_trial_without_markers_on_knees_and_ankles_cannot_stand_for_it(synthet
     subject = Subject(name="one", mass_kg=72.6, height_m=HEIGHT_M, sex="male")
     run = replace(walk, markers=walk.markers.select(worn))
     person = Person(subject, [TrialInput(run)], None)
-    (found,) = [one for one in check_person(person).findings if one.code == "S208"]
+    (found,) = [finding for finding in check_person(person).findings if finding.code == "S208"]
     assert found.evidence["landmarks"].value == "ankle_lateral_r, knee_lateral_r"
     with pytest.raises(BlockedError) as caught:
         prepared(screen(person), Settings())
-    assert "S208" in [one.code for one in caught.value.blocking]
+    assert "S208" in [finding.code for finding in caught.value.blocking]
 
 
 def test_a_walk_stands_for_its_static_trial(synthetic_lab):
     without = ready(synthetic_lab, None)
     usual = ready(synthetic_lab, read_recording(synthetic_lab / "static.c3d"))
-    assert [one.severity.name for one in without.findings if one.code == "S207"] == ["WARNING"]
-    assert "S207" not in {one.code for one in usual.findings}
+    assert [finding.severity.name for finding in without.findings if finding.code == "S207"] == ["WARNING"]
+    assert "S207" not in {finding.code for finding in usual.findings}
     for name, sd_m in usual.uncertainty.centres.items():
         assert without.uncertainty.centres[name] == pytest.approx(WITHOUT_STATIC * sd_m)
     assert without.uncertainty.marker_sd_m == pytest.approx(WITHOUT_STATIC * usual.uncertainty.marker_sd_m)

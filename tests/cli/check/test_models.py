@@ -14,7 +14,7 @@ def test_model(measured_folder, tmp_path, monkeypatch):
     model = measured_folder / "rajagopal_walk" / "scaled.osim"
     person = ["--mass", "85", "--height", "1.83", "--sex", "male"]
     content = told(model, *person)
-    assert "O215" in [one["code"] for one in content["findings"] if one["severity"] == "WARNING"]
+    assert "O215" in [finding["code"] for finding in content["findings"] if finding["severity"] == "WARNING"]
     outcome = run("check", model, *person, "-o", "out", "-v")
     assert outcome.status == 0
     assert re.search(r"pelvis +model +13\.30", outcome.out)
@@ -24,7 +24,7 @@ def test_model(measured_folder, tmp_path, monkeypatch):
     assert "Segments, in ISB axes" in page
     assert "13.30" in page
     assert run("check", model, "--height", "183", "--sex", "male").status == 2
-    assert [one["code"] for one in told(model)["findings"] if one["code"].startswith("O4")] == ["O415"]
+    assert [finding["code"] for finding in told(model)["findings"] if finding["code"].startswith("O4")] == ["O415"]
 
 
 def test_impossible_model_is_status_1(synthetic_lab, tmp_path):
@@ -51,7 +51,7 @@ def test_subject_file_with_a_model(synthetic_lab, tmp_path):
     facts = facts_of(content)["walk"]
     assert re.search(r"scaled\.osim: \d+ of its \d+ labels", facts["marker set"])
     assert re.fullmatch(r"[\d.]+ to [\d.]+ s", facts["complete contact"])
-    assert {"L101", "P278"}.isdisjoint(one["code"] for one in content["findings"])
+    assert {"L101", "P278"}.isdisjoint(finding["code"] for finding in content["findings"])
 
 
 def test_a_model_and_forces_are_given_as_to_a_fit(synthetic_lab, tmp_path):
@@ -81,7 +81,7 @@ def test_model_that_is_doubted_in_a_subject_file(measured_folder, tmp_path):
             f'loads = "{data / "walking1_external_forces.xml"}"\n'
         )
     found = {
-        name: [one for one in told(tmp_path / f"{name}.toml")["findings"] if one["code"] == "O303"]
+        name: [finding for finding in told(tmp_path / f"{name}.toml")["findings"] if finding["code"] == "O303"]
         for name in ("sound", "moved")
     }
     assert found["sound"] == []

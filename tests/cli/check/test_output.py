@@ -27,9 +27,9 @@ def test_the_verdict_is_one_line_and_verbose_says_all(lab):
     loud = run("check", lab / "subject.toml", "-v")
     findings = told(lab / "subject.toml")["findings"]
     assert findings
-    for one in findings:
-        assert f"{one['severity']}  " in loud.out
-        assert f"{one['code']} {one['message']}" in loud.out
+    for finding in findings:
+        assert f"{finding['severity']}  " in loud.out
+        assert f"{finding['code']} {finding['message']}" in loud.out
     before = loud.out.partition("\nUse. ")[0].splitlines()
     assert max(map(len, before)) <= 80
     for facts in facts_of(told(lab / "subject.toml")).values():
@@ -66,8 +66,8 @@ def test_page_is_one_file_that_needs_nothing_else(lab):
     (written,) = (lab / "out").glob("[!.]*")
     assert written.stat().st_size < 3_000_000
     page = Elements(written.read_text(encoding="utf-8"))
-    references = [each[name] for _, each in page.tags for name in ("src", "href", "srcset", "data") if name in each]
-    assert [one for one in references if not one.startswith("#")] == []
+    references = [tag[name] for _, tag in page.tags for name in ("src", "href", "srcset", "data") if name in tag]
+    assert [reference for reference in references if not reference.startswith("#")] == []
     assert "<script>alert" not in written.read_text(encoding="utf-8")
     words = " ".join(page.text.split())
     assert "<script>alert(1)<script>" in words

@@ -42,14 +42,16 @@ def test_recordings_of_one_name_are_told_apart(lab):
 def test_files_of_two_people_keep_their_masses(measured_folder):
     """Each file carries its person's mass: the first walk's is used, and that of the other person reported."""
     a, b = ([measured_folder / "pig_c3d" / f"subject_{who}_{kind}.c3d" for kind in ("static", "walk")] for who in "ab")
-    (alone,) = [one for one in told(*a)["findings"] if one["code"] == "S111"]
+    (alone,) = [finding for finding in told(*a)["findings"] if finding["code"] == "S111"]
     assert alone["evidence"]["stated_kg"]["value"] == pytest.approx(41.5, abs=0.1)
     for files, masses in (((*a, *b), [41.5, 47.5]), ((*b, *a), [47.5, 41.5])):
         together = told(*files, status=1)["findings"]
-        (stated,) = [one for one in together if (one["code"], one["where"].get("part")) == ("S103", "mass")]
+        (stated,) = [
+            finding for finding in together if (finding["code"], finding["where"].get("part")) == ("S103", "mass")
+        ]
         assert [round(stated["evidence"][name]["value"], 1) for name in ("stated", "filed")] == masses
         # each walk is of another person than one of the static trials
-        accused = {one["where"]["trial"] for one in blocking(together) if one["code"] == "S203"}
+        accused = {finding["where"]["trial"] for finding in blocking(together) if finding["code"] == "S203"}
         assert accused == {"subject_a_static", "subject_b_static"}
 
 

@@ -45,8 +45,8 @@ def test_widths_of_joints_may_come_from_elsewhere(tmp_path, recording_of, c3d_la
     walk = recording_of("synthetic/walk.c3d").markers
     write_trc(tmp_path / "walk.trc", walk)
     (tmp_path / "subject.toml").write_text(subject.replace("WIDTHS", "").replace("c3d", "trc"))
-    lacking = [one for one in blocking(told(tmp_path, status=1)["findings"]) if one["code"] == "L105"]
-    assert "knee_r" in {one["where"]["part"] for one in lacking}
+    lacking = [finding for finding in blocking(told(tmp_path, status=1)["findings"]) if finding["code"] == "L105"]
+    assert "knee_r" in {finding["where"]["part"] for finding in lacking}
     stated = "\n".join(f"{joint}_width_mm = 80.0" for joint in ("knee", "ankle", "elbow"))
     (tmp_path / "subject.toml").write_text(subject.replace("WIDTHS", stated).replace("c3d", "trc"))
     assert "L105" not in blocking_codes(told(tmp_path, status=None)["findings"])

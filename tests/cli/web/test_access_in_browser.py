@@ -100,6 +100,6 @@ def test_pages_have_no_barriers_fit_a_phone_and_are_dark_where_the_system_is(bro
             assert tab.page.evaluate("document.documentElement.scrollWidth") <= viewport["width"], path
             assert (picture(tab.page)[-20:, :10].mean() < 0.35) == (scheme == "dark")
             violations = axe.Axe().run(tab.page, None, VIOLATIONS).response["violations"]
-            found = [(one["id"], [node["target"] for node in one["nodes"]]) for one in violations]
+            found = [(violation["id"], [node["target"] for node in violation["nodes"]]) for violation in violations]
             assert found == [], (path, viewport, scheme)
     tab.page.close()

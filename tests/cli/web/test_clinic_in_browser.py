@@ -51,34 +51,34 @@ def test_a_condition_is_stated_beside_its_walk(tab, app, c3d_lab):
     field = tab.page.get_by_label("Condition of walk.c3d")
     field.fill("with orthosis")
     tab.check().checked()
-    assert [one.condition for one in read_subject(person.subject).trials] == ["with orthosis"]
+    assert [trial.condition for trial in read_subject(person.subject).trials] == ["with orthosis"]
     playwright.expect(field).to_have_value("with orthosis")
     field.fill("")
     tab.check().checked()
-    assert [one.condition for one in read_subject(person.subject).trials] == [""]
+    assert [trial.condition for trial in read_subject(person.subject).trials] == [""]
     tab.quiet()
 
 
 def test_norms_are_made_of_the_chosen_people_and_used_in_their_letter(browser, demo_run, fit_of, tmp_path):
-    with running(tmp_path / "library") as own:
+    with running(tmp_path / "library") as server:
         for name, results in (("Control", demo_run[1]), ("Other", fit_of("synthetic").folder)):
-            folder = own.library.add(name).results
+            folder = server.library.add(name).results
             folder.mkdir()
             for file in ("fit.npz", "fit.json", "report.html"):
                 shutil.copyfile(results / file, folder / file)
-        tab = Tab(browser, own).home()
-        assert not own.library.norms.exists()
+        tab = Tab(browser, server).home()
+        assert not server.library.norms.exists()
         for name in ("Control", "Other"):
             tab.page.get_by_label(f"Compare {name}").check()
         tab.page.get_by_role("button", name="Make norms from the chosen").click()
         playwright.expect(tab.page.get_by_text("norms.csv of this folder")).to_be_visible()
-        assert own.library.norms.read_text().startswith("quantity,percent,mean,sd")
-        letter = own.ask("/people/Control/letter")
+        assert server.library.norms.read_text().startswith("quantity,percent,mean,sd")
+        letter = server.ask("/people/Control/letter")
         assert letter.status == 200
         assert "Gait Profile Score" in letter.text
         assert "sandbox" in letter.headers["content-security-policy"]
-        assert own.post("/people/Control/comparison", "before=shod&after=barefoot").status == 303
-        while json.loads(own.ask("/people/Control/progress").text)["comparison"]:
+        assert server.post("/people/Control/comparison", "before=shod&after=barefoot").status == 303
+        while json.loads(server.ask("/people/Control/progress").text)["comparison"]:
             tab.page.wait_for_timeout(200)
-        assert "shod" in own.library.person("Control").notes()["comparison"]["message"]
+        assert "shod" in server.library.person("Control").notes()["comparison"]["message"]
         tab.quiet()

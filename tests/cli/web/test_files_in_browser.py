@@ -104,7 +104,7 @@ def test_nobody_stays_in_the_library_of_whom_no_file_was_taken(browser, app, tmp
 def test_a_person_is_called_as_the_files_are(browser, tmp_path, names, person):
     for name in names:
         (tmp_path / name).write_text("no markers")
-    with running(tmp_path / "library") as own:
-        tab = Tab(browser, own).home().drop(*(tmp_path / name for name in names)).arrived()
+    with running(tmp_path / "library") as server:
+        tab = Tab(browser, server).home().drop(*(tmp_path / name for name in names)).arrived()
         assert tab.page.get_by_role("heading", level=1).inner_text() == person
         tab.quiet()

@@ -59,9 +59,9 @@ def test_how_a_fit_ended_is_noted_before_it_leaves_the_queue(library, worker, mo
     worker("os.abort()")
     jobs, person, queued, note = Jobs(), library.add("A"), [], PersonFolder.note
 
-    def noting(own, **values):
-        queued.append(jobs.busy(own))
-        note(own, **values)
+    def noting(noted, **values):
+        queued.append(jobs.busy(noted))
+        note(noted, **values)
 
     with jobs.at_work():
         jobs.add(person, "fit")

@@ -44,10 +44,10 @@ def test_reload_second_tab_and_cancel_during_a_fit(browser, app, waiting):
     second.page.goto(address)
     playwright.expect(second.page.locator("progress")).to_have_attribute("value", "0.3")
     second.page.get_by_role("button", name="Cancel").click()
-    for one in (second, first):
-        playwright.expect(one.page.locator(".message.warning")).to_contain_text("Cancelled.")
-        playwright.expect(one.page.get_by_role("button", name="Estimate", exact=True)).to_be_visible()
-        one.quiet()
+    for tab in (second, first):
+        playwright.expect(tab.page.locator(".message.warning")).to_contain_text("Cancelled.")
+        playwright.expect(tab.page.get_by_role("button", name="Estimate", exact=True)).to_be_visible()
+        tab.quiet()
 
 
 def test_a_fit_that_ends_repeats_no_form(browser, app, monkeypatch, tmp_path, c3d_lab):
@@ -95,13 +95,13 @@ def test_a_crash_of_one_fit_is_said_and_the_next_one_is_done(browser, app, monke
 
 def test_results_are_listed_opened_again_compared_and_deleted(browser, demo_run, two_level_run, tmp_path):
     library = tmp_path / "library"
-    with running(library) as own:
+    with running(library) as server:
         for name, results in (("Spring", demo_run[1]), ("Autumn", two_level_run[1])):
-            folder = own.library.add(name).results
+            folder = server.library.add(name).results
             folder.mkdir()
             for file in ("fit.npz", "fit.json", "report.html"):
                 shutil.copyfile(results / file, folder / file)
-        tab = Tab(browser, own).home()
+        tab = Tab(browser, server).home()
         page = tab.page
         assert page.locator(".people a").all_inner_texts() in (["Spring", "Autumn"], ["Autumn", "Spring"])
         page.get_by_role("link", name="Spring").click()
@@ -147,7 +147,7 @@ def test_the_first_screen_has_what_may_be_used_and_what_to_do_next(browser, app,
     tab.page.goto(f"{app.address}people/{quote(person.name)}")
     first = tab.page.get_by_label("Outcome", exact=True)
     playwright.expect(first.locator(".purposes .level")).to_have_text(["use with care"])
-    codes = [one["code"] for one in outcome["steps"]]
+    codes = [finding["code"] for finding in outcome["steps"]]
     assert codes
     assert len(codes) <= 3
     playwright.expect(first.locator("> .findings a")).to_have_text(codes)
@@ -182,8 +182,8 @@ def test_a_report_reaches_nothing(browser, app, c3d_lab):
 
 
 def test_it_ends_by_its_button_and_says_so(browser, tmp_path):
-    with running(tmp_path / "library") as own:
-        tab = Tab(browser, own).home()
+    with running(tmp_path / "library") as server:
+        tab = Tab(browser, server).home()
         tab.page.get_by_role("button", name="Close Kinertia").click()
         playwright.expect(tab.page.get_by_role("heading", name="Kinertia has ended")).to_be_visible()
         tab.page.close()

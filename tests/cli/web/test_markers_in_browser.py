@@ -80,7 +80,7 @@ def test_a_marker_tells_its_label_when_it_is_pointed_at(tab, app, c3d_lab):
     tab.page.goto(f"{app.address}people/{quote(person.name)}/markers")
     canvas = tab.page.locator("canvas")
     tab.page.get_by_label("labels", exact=True).uncheck()
-    assert {one["text"] for one in tab.page.evaluate("window.written")} == {"LFIN", "RFIN"}
+    assert {label["text"] for label in tab.page.evaluate("window.written")} == {"LFIN", "RFIN"}
     dark = np.argwhere(picture(canvas).max(axis=2) < 0.15)
     chosen = dark[np.abs(dark - dark[0]).max(axis=1) < 6]
     y, x = chosen.mean(axis=0)

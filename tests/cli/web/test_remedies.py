@@ -45,7 +45,7 @@ def proposing(person, *remedies):
     """The person after a check that proposes these."""
     person.check.mkdir(exist_ok=True)
     fresh = Library(person.folder.parent).person(person.name)
-    found = [{"settings": [one.to_dict() for one in remedies]}]
+    found = [{"settings": [remedy.to_dict() for remedy in remedies]}]
     (person.check / "outcome.json").write_text(json.dumps({"inputs": fresh.inputs, "findings": found}))
     return fresh
 
@@ -70,7 +70,7 @@ def test_what_is_written_is_what_a_user_would_type(person):
     for remedy in (WAIVE, IGNORE, *SETTINGS[4:6]):
         apply(proposing(person, remedy), remedy.text, "a known fault")
     wanted = read_subject(person.subject)
-    walk, other = sorted(wanted.trials, key=lambda one: len(one.name))
+    walk, other = sorted(wanted.trials, key=lambda trial: len(trial.name))
     assert walk.diagnostics.overrule.waive == ("P244",)
     assert walk.diagnostics.overrule.reason("P244") == "a known fault"
     assert walk.window_s == (0.6, 1.4)
@@ -93,9 +93,9 @@ def test_a_trial_that_was_left_out_comes_back_with_its_entries(person):
     write_form(person, {"condition:walk.c3d": "with orthosis"})
     remedy = Remedy("trial", "", None, "walk")
     apply(proposing(person, remedy), remedy.text, "")
-    assert [one.name for one in read_subject(person.subject).trials] == ["walk 2"]
+    assert [trial.name for trial in read_subject(person.subject).trials] == ["walk 2"]
     undo(person, remedy.text)
-    assert {one.name: one.condition for one in read_subject(person.subject).trials} == {
+    assert {trial.name: trial.condition for trial in read_subject(person.subject).trials} == {
         "walk": "with orthosis",
         "walk 2": "",
     }
@@ -117,6 +117,6 @@ def test_what_nobody_proposes_or_lacks_a_reason_is_refused(person):
 
 
 def test_buttons_have_words_of_their_own():
-    buttons = [Button.of(one.to_dict()) for one in SETTINGS]
-    assert len({one.label for one in buttons}) == len(SETTINGS)
-    assert [one.overrules for one in buttons] == [one in (WAIVE, IGNORE) for one in SETTINGS]
+    buttons = [Button.of(setting.to_dict()) for setting in SETTINGS]
+    assert len({button.label for button in buttons}) == len(SETTINGS)
+    assert [button.overrules for button in buttons] == [setting in (WAIVE, IGNORE) for setting in SETTINGS]

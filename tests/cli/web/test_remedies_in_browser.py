@@ -91,7 +91,7 @@ def test_trials_steps_markers_and_the_static_trial_are_left_out(tab, app, c3d_la
     marker, window, trial, static = written.values()
     assert marker.trials[1].leave_out == ("LTOE",)
     assert window.trials[1].window_s == (0.7, 1.1)
-    assert [one.name for one in trial.trials] == ["walk"]
+    assert [listed.name for listed in trial.trials] == ["walk"]
     assert static.model.static is None
     tab.quiet()
 

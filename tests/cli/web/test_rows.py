@@ -25,7 +25,7 @@ CONTENT = {
 
 
 def form_of(content):
-    return {field.key: field.value for each in rows(content) for row in each.rows for field in row}
+    return {field.key: field.value for table in rows(content) for row in table.rows for field in row}
 
 
 def test_the_form_gives_the_entries_back():
@@ -55,7 +55,7 @@ def test_what_was_typed_in_a_new_row_is_not_dropped(form, sentence):
     typed = form_of(CONTENT) | form
     with pytest.raises(SettingsError, match=re.escape(sentence)):
         with_rows(CONTENT, typed)
-    shown = {field.key: field.value for each in rows(CONTENT, typed) for row in each.rows for field in row}
+    shown = {field.key: field.value for table in rows(CONTENT, typed) for row in table.rows for field in row}
     assert {key: shown[key] for key in form} == form
 
 
@@ -83,7 +83,7 @@ def test_three_numbers_as_people_write_them(typed, place):
 
 def test_other_shapes_stay_for_the_command_lines_message():
     for content in ({"segment": 3}, {"attached": "rucksack"}, {"attached": [1]}, {"segment": {"a": 2}}):
-        assert [each.written for each in rows(content)] == [0, 0]
+        assert [row.written for row in rows(content)] == [0, 0]
 
 
 def test_they_reach_the_fit_and_mistakes_have_the_command_lines_message(tmp_path, c3d_lab):

@@ -127,7 +127,7 @@ MEASURED = [
 
 
 @pytest.mark.parametrize(
-    ("markers", "forces", "strides", "turns"), [one for one in MEASURED if is_here([one[0], one[1]])]
+    ("markers", "forces", "strides", "turns"), [files for files in MEASURED if is_here([files[0], files[1]])]
 )
 def test_measured_recordings(recording_of, markers, forces, strides, turns):
     context = context_of(recording_of(markers, forces))

@@ -25,8 +25,8 @@ def recording(change=None):
     return whole if change is None else replace(whole, markers=changed(whole.markers, change))
 
 
-def found(one, **options):
-    context = context_of(one, FEET_ONLY, **options)
+def found(read, **options):
+    context = context_of(read, FEET_ONLY, **options)
     return [*visible(context), *trajectories(context), *frames(context)]
 
 

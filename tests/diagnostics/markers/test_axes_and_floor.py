@@ -63,9 +63,9 @@ def test_tilted_cameras(name, degrees, recording_of):
     )  # fmt: skip
     sign = np.sign(forward) * (1.0 if along_x else -1.0)
     turn = Rotation.from_euler("z" if along_x else "x", sign * degrees, degrees=True).as_matrix()
-    (one,) = floor_slope(read(recording_of, name, turn))
-    assert (one.code, one.where.axis) == ("M144", "fore-aft")
-    assert np.degrees(one.evidence["slope_rad"].value) == pytest.approx(degrees, abs=0.3)
+    (finding,) = floor_slope(read(recording_of, name, turn))
+    assert (finding.code, finding.where.axis) == ("M144", "fore-aft")
+    assert np.degrees(finding.evidence["slope_rad"].value) == pytest.approx(degrees, abs=0.3)
 
 
 @pytest.mark.parametrize("name", LEVEL)
@@ -99,8 +99,8 @@ def test_axes_and_unit(turn, vertical, expected, up):
     """Axes are called as the file calls them."""
     found = list(unit_and_vertical(context_of(Recording("walk", walking(turn), None, vertical=vertical))))
     assert codes(found) == expected
-    assert {one.severity for one in found} <= {Severity.ERROR}
-    assert [one.evidence["up"].value for one in found if one.code == "M142"] == ([up] if up else [])
+    assert {finding.severity for finding in found} <= {Severity.ERROR}
+    assert [finding.evidence["up"].value for finding in found if finding.code == "M142"] == ([up] if up else [])
 
 
 def test_nobody():

@@ -75,8 +75,8 @@ def found(markers, marker_set):
 def exchanged(markers, marker_set, *pairs):
     """The markers with the labels of these landmarks, of one marker each, exchanged, and the labels."""
     labels = [tuple(marker_set.landmarks[name][0] for name in pair) for pair in pairs]
-    assert {one for pair in labels for one in pair} <= set(markers.labels)
-    return relabelled(markers, *labels), {one for pair in labels for one in pair}
+    assert {label for pair in labels for label in pair} <= set(markers.labels)
+    return relabelled(markers, *labels), {label for pair in labels for label in pair}
 
 
 def of_recordings(table):
@@ -106,18 +106,18 @@ def test_another_axis_up(recorded, up, name):
     axis, sign = abs(up), -1.0 if up < 0 else 1.0
     turn = {2: [[1, 0, 0], [0, 0, -1], [0, 1, 0]], 0: [[0, 1, 0], [-1, 0, 0], [0, 0, 1]], 1: np.diag([-1.0, 1.0, -1.0])}
     to = sign * np.array(turn[axis], dtype=float)
-    (one,) = unit_and_vertical(context_of(markers.rotated(to), marker_set))
-    assert (one.code, one.severity) == ("M142", Severity.ERROR)
-    assert (one.evidence["up"].value, one.evidence["expected"].value) == (name, "Y")
+    (finding,) = unit_and_vertical(context_of(markers.rotated(to), marker_set))
+    assert (finding.code, finding.severity) == ("M142", Severity.ERROR)
+    assert (finding.evidence["up"].value, finding.evidence["expected"].value) == (name, "Y")
 
 
 @pytest.mark.parametrize("recorded", FAULT_FREE, indirect=True)
 @pytest.mark.parametrize("axis", [0, 2])
 def test_mirrored_axes(recorded, axis):
     markers, marker_set = recorded
-    (one,) = found(markers.rotated(np.diag(np.where(np.arange(3) == axis, -1.0, 1.0))), marker_set)
-    assert (one.code, one.where.markers) == ("L201", ())
-    assert one.evidence["cosine"].value < -0.5
+    (finding,) = found(markers.rotated(np.diag(np.where(np.arange(3) == axis, -1.0, 1.0))), marker_set)
+    assert (finding.code, finding.where.markers) == ("L201", ())
+    assert finding.evidence["cosine"].value < -0.5
 
 
 @pytest.mark.parametrize(
@@ -129,9 +129,9 @@ def test_swapped_labels(recorded, pairs, code):
     """Nothing else is found with them."""
     markers, marker_set = recorded
     swapped, labels = exchanged(markers, marker_set, *pairs)
-    (one,) = found(swapped, marker_set)
-    assert (one.code, one.severity) == (code, Severity.ERROR)
-    assert labels <= set(one.where.markers)
+    (finding,) = found(swapped, marker_set)
+    assert (finding.code, finding.severity) == (code, Severity.ERROR)
+    assert labels <= set(finding.where.markers)
 
 
 @pytest.mark.parametrize("recorded", here(CLUSTERS_STANDING), indirect=True)
@@ -146,9 +146,9 @@ def test_independent_swaps_are_all_found(recorded):
 def test_a_wand_of_the_thigh_and_one_of_the_shank_swapped_in_every_file(recorded, thigh, shank):
     markers, marker_set = recorded
     assert {thigh, shank} <= set(markers.labels)
-    (one,) = found(relabelled(markers, (thigh, shank)), marker_set)
-    assert one.code == "L206"
-    assert one.where.markers[0] == thigh
+    (finding,) = found(relabelled(markers, (thigh, shank)), marker_set)
+    assert finding.code == "L206"
+    assert finding.where.markers[0] == thigh
 
 
 @pytest.mark.parametrize("recorded", here(["synthetic/walk.c3d", "pig_c3d/subject_a_walk.c3d"]), indirect=True)
@@ -171,8 +171,8 @@ def test_left_and_right_of_the_head_swapped(recorded):
     markers, marker_set = recorded
     swapped = relabelled(relabelled(markers, ("LFHD", "RFHD")), ("LBHD", "RBHD"))
     said = found(swapped, marker_set)
-    assert [(one.code, one.severity) for one in said] == [("L202", Severity.WARNING)] * 2
-    assert {label for one in said for label in one.where.markers} == {"LFHD", "RFHD", "LBHD", "RBHD"}
+    assert [(finding.code, finding.severity) for finding in said] == [("L202", Severity.WARNING)] * 2
+    assert {label for finding in said for label in finding.where.markers} == {"LFHD", "RFHD", "LBHD", "RBHD"}
 
 
 @pytest.mark.parametrize("recorded", FAULT_FREE, indirect=True)
@@ -184,7 +184,7 @@ def test_who_walks_backwards(recorded):
     goes = np.linalg.norm(np.nanmedian(markers.positions[-1] - markers.positions[0], axis=0)[[0, 2]]) > 0.5
     assert context_of(backwards, marker_set).walks_backwards == goes
     said = list(direction_of_travel(context_of(backwards, marker_set)))
-    assert [(one.code, one.severity, one.causes) for one in said] == (
+    assert [(finding.code, finding.severity, finding.causes) for finding in said] == (
         [("S311", Severity.INFO, ("walking backwards",))] if goes else []
     )
 
@@ -198,5 +198,5 @@ def test_heading_is_unknown(recorded):
     hidden = Markers(markers.time, markers.labels, places)
     absent = markers.select([label for label in markers.labels if label != right])
     for changed, count in ((hidden, 0.0), (absent, 1.0)):
-        (one,) = heading(context_of(changed, marker_set))
-        assert (one.code, one.evidence["absent"].value) == ("L106", count)
+        (finding,) = heading(context_of(changed, marker_set))
+        assert (finding.code, finding.evidence["absent"].value) == ("L106", count)

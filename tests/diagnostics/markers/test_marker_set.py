@@ -24,14 +24,17 @@ def found(labels, marker_set):
 def test_missing_labels(share, code, named):
     """Those at the beginning are of the legs."""
     labels = SET.labels[::-1][: round(share * len(SET.labels))]
-    one = found(labels, SET if named else None)
-    assert codes(one) == ([code] if code else [])
+    findings = found(labels, SET if named else None)
+    assert codes(findings) == ([code] if code else [])
     if code == "L102":
-        assert (one[0].severity, one[0].evidence["missing"].value) == (Severity.INFO, len(SET.labels) - len(labels))
-        assert set(one[0].where.markers) == set(SET.labels) - set(labels)
+        assert (findings[0].severity, findings[0].evidence["missing"].value) == (
+            Severity.INFO,
+            len(SET.labels) - len(labels),
+        )
+        assert set(findings[0].where.markers) == set(SET.labels) - set(labels)
     if code == "L101":
-        assert one[0].severity is Severity.ERROR
-        assert not named or one[0].evidence["labels_found"].value == len(labels)
+        assert findings[0].severity is Severity.ERROR
+        assert not named or findings[0].evidence["labels_found"].value == len(labels)
 
 
 def test_a_sacral_marker_and_the_psis_stand_for_each_other():
@@ -39,10 +42,10 @@ def test_a_sacral_marker_and_the_psis_stand_for_each_other():
     whole = read_marker_set("plug-in-gait").labels
     for unused in (["SACR"], ["RPSI", "LPSI"]):
         assert found([label for label in whole if label not in unused], None) == []
-    (one,) = found([label for label in whole if label not in ("SACR", "LPSI")], None)
-    assert one.where.markers == ("LPSI",)
-    (one,) = found([label for label in whole if label not in ("SACR", "RPSI", "LPSI")], None)
-    assert one.where.markers == ("RPSI", "LPSI")
+    (finding,) = found([label for label in whole if label not in ("SACR", "LPSI")], None)
+    assert finding.where.markers == ("LPSI",)
+    (finding,) = found([label for label in whole if label not in ("SACR", "RPSI", "LPSI")], None)
+    assert finding.where.markers == ("RPSI", "LPSI")
 
 
 def test_labels_of_a_model():
@@ -53,9 +56,9 @@ def test_labels_of_a_model():
 
 def test_other_spellings_are_remarks():
     labels = [label.lower() if label == "RASI" else label for label in SET.labels]
-    (one,) = found(labels, choose_marker_set(labels))
-    assert (one.code, one.severity) == ("L103", Severity.INFO)
-    assert (one.evidence["written"].value, one.evidence["label"].value) == ("rasi", "RASI")
+    (finding,) = found(labels, choose_marker_set(labels))
+    assert (finding.code, finding.severity) == ("L103", Severity.INFO)
+    assert (finding.evidence["written"].value, finding.evidence["label"].value) == ("rasi", "RASI")
 
 
 @pytest.mark.parametrize("name", here(["synthetic/static.trc", "synthetic/static.c3d", "pig_c3d/subject_a_static.c3d"]))
@@ -70,8 +73,8 @@ def test_a_landmark_that_is_missing(recording_of):
     marker_set = choose_marker_set(static.markers.labels)
     lateral = marker_set.landmarks["knee_lateral_r"][0]
     without = static.markers.select([label for label in static.markers.labels if label != lateral])
-    (one,) = landmarks(context_of(without, marker_set, is_static=True))
-    assert (one.code, one.where.trial) == ("L105", "walk")
+    (finding,) = landmarks(context_of(without, marker_set, is_static=True))
+    assert (finding.code, finding.where.trial) == ("L105", "walk")
 
 
 def test_a_landmark_that_one_can_do_without(recording_of):
@@ -80,7 +83,7 @@ def test_a_landmark_that_one_can_do_without(recording_of):
     marker_set = choose_marker_set(static.markers.labels)
     for landmark, part, severity in (("elbow_lateral_r", "arm_r", "INFO"), ("knee_medial_l", "knee_l", "WARNING")):
         (label,) = marker_set.landmarks[landmark]
-        without = static.markers.select([one for one in static.markers.labels if one != label])
-        (one,) = landmarks(context_of(without, marker_set, is_static=True))
-        assert (one.code, one.where.part, one.severity) == ("L107", part, Severity[severity])
-        assert (one.evidence["lacking"].value, one.evidence["labels"].value[: len(label)]) == (landmark, label)
+        without = static.markers.select([kept for kept in static.markers.labels if kept != label])
+        (finding,) = landmarks(context_of(without, marker_set, is_static=True))
+        assert (finding.code, finding.where.part, finding.severity) == ("L107", part, Severity[severity])
+        assert (finding.evidence["lacking"].value, finding.evidence["labels"].value[: len(label)]) == (landmark, label)

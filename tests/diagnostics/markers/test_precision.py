@@ -33,7 +33,7 @@ def found(markers, question=frames):
 
 
 def made_up(markers):
-    return {"M122", "M123"} & {one.code for one in found(markers)}
+    return {"M122", "M123"} & {finding.code for finding in found(markers)}
 
 
 @pytest.mark.parametrize("name", [*WALKS, *OTHERS])
@@ -52,15 +52,15 @@ def walk(request, recording_of):
 def test_few_frames_a_second_are_reported(walk, rate_hz, codes):
     """Joint moments moved by up to 3.8 SDs with 33 of 100 frames a second, and nothing was said."""
     markers = replace(walk, time=np.arange(len(walk.time)) / rate_hz)
-    assert [one.code for one in found(markers) if one.code == "M124"] == codes
+    assert [finding.code for finding in found(markers) if finding.code == "M124"] == codes
 
 
 @pytest.mark.parametrize("times", [2, 3, 4])
 def test_frames_that_are_held(walk, times):
     held = replace(walk, positions=walk.positions[np.arange(len(walk.time)) // times * times])
-    (one,) = found(held)
-    assert (one.code, one.evidence["method"].value) == ("M123", "held")
-    assert one.evidence["true_rate_hz"].value == pytest.approx(walk.rate_hz / times, rel=0.05)
+    (finding,) = found(held)
+    assert (finding.code, finding.evidence["method"].value) == ("M123", "held")
+    assert finding.evidence["true_rate_hz"].value == pytest.approx(walk.rate_hz / times, rel=0.05)
     assert without_copied_frames(held) is held
 
 
@@ -75,9 +75,9 @@ def copied(walk, every):
 def test_few_copies_of_lost_frames_are_a_warning(walk, every, severity):
     """They become gaps, which is all that is wrong with them (D5)."""
     markers, count = copied(walk, every)
-    (one,) = found(markers)
-    assert (one.code, one.severity, one.evidence["frames"].value) == ("M122", severity, count)
-    assert one.evidence["first_s"].value == walk.time[every]
+    (finding,) = found(markers)
+    assert (finding.code, finding.severity, finding.evidence["frames"].value) == ("M122", severity, count)
+    assert finding.evidence["first_s"].value == walk.time[every]
     cleaned = without_copied_frames(markers)
     lost = np.arange(len(walk.time)) % every == 0
     lost[0] = False
@@ -89,10 +89,10 @@ def test_frames_that_were_put_in_are_an_error(walk):
     """Everything after them is late."""
     middle = len(walk.time) // 2
     rows = np.r_[0 : middle + 1, middle, middle, middle + 1 : len(walk.time) - 2]
-    (one,) = found(replace(walk, positions=walk.positions[rows]))
-    assert (one.code, one.severity) == ("M122", Severity.ERROR)
-    assert (one.evidence["frames"].value, one.evidence["inserted"].value) == (2, 2)
-    assert one.evidence["first_s"].value == walk.time[middle + 1]
+    (finding,) = found(replace(walk, positions=walk.positions[rows]))
+    assert (finding.code, finding.severity) == ("M122", Severity.ERROR)
+    assert (finding.evidence["frames"].value, finding.evidence["inserted"].value) == (2, 2)
+    assert finding.evidence["first_s"].value == walk.time[middle + 1]
 
 
 def test_frames_held_at_the_ends_do_not_matter(walk):
@@ -106,8 +106,8 @@ def test_frames_that_are_drawn_between_others(walk):
     rows = np.arange(kept[-1] + 1)
     share = (rows % 4 / 4)[:, None, None]
     before, after = walk.positions[rows // 4 * 4], walk.positions[np.minimum(rows // 4 * 4 + 4, kept[-1])]
-    (one,) = found(replace(walk, time=walk.time[rows], positions=(1 - share) * before + share * after))
-    assert (one.code, one.evidence["method"].value) == ("M123", "interpolated")
+    (finding,) = found(replace(walk, time=walk.time[rows], positions=(1 - share) * before + share * after))
+    assert (finding.code, finding.evidence["method"].value) == ("M123", "interpolated")
 
 
 def test_standing_still_before_the_motion_is_not_made_up(walk):
@@ -124,7 +124,7 @@ def test_standing_still_before_the_motion_is_not_made_up(walk):
 @pytest.mark.parametrize("step_m", [0.001, 0.002, 0.005, 0.01])
 def test_coordinates_that_were_rounded(walk, step_m):
     rounded = found(replace(walk, positions=np.round(walk.positions / step_m) * step_m), precision)
-    steps = [one.evidence["step_m"].value for one in rounded if one.code == "M131"]
+    steps = [finding.evidence["step_m"].value for finding in rounded if finding.code == "M131"]
     assert steps == pytest.approx([step_m] if step_m > 0.001 else [], rel=1e-3)
 
 
@@ -132,5 +132,5 @@ def test_coordinates_that_were_rounded(walk, step_m):
 def test_noise(walk, sd_m, count):
     noise = np.random.default_rng(104).normal(0.0, sd_m, walk.positions.shape)
     noisy = found(replace(walk, positions=walk.positions + noise), precision)
-    assert [one.code for one in noisy] == ["M132"] * count
-    assert [one.evidence["noise_m"].value for one in noisy] == pytest.approx([sd_m] * count, rel=0.2)
+    assert [finding.code for finding in noisy] == ["M132"] * count
+    assert [finding.evidence["noise_m"].value for finding in noisy] == pytest.approx([sd_m] * count, rel=0.2)

@@ -85,10 +85,10 @@ def test_fault_free_trials(walk, name):
 )
 def test_swapped_labels(walk, name, pair):
     skeleton, markers = walk(name)
-    (one,) = found(skeleton, relabelled(markers, pair))
-    assert (one.code, one.severity, one.where.trial) == ("L212", Severity.ERROR, "walk")
-    assert set(one.where.markers) == set(pair)
-    assert one.evidence["after_m"].value < 0.55 * one.evidence["before_m"].value
+    (finding,) = found(skeleton, relabelled(markers, pair))
+    assert (finding.code, finding.severity, finding.where.trial) == ("L212", Severity.ERROR, "walk")
+    assert set(finding.where.markers) == set(pair)
+    assert finding.evidence["after_m"].value < 0.55 * finding.evidence["before_m"].value
 
 
 @pytest.fixture(scope="module")
@@ -101,15 +101,15 @@ def made():
 def test_made_markers(made):
     skeleton, markers = made
     assert found(skeleton, markers) == []
-    (one,) = found(skeleton, relabelled(markers, ("R.Knee.Lat", "L.Knee.Lat")))
-    assert (one.code, set(one.where.markers)) == ("L212", {"R.Knee.Lat", "L.Knee.Lat"})
+    (finding,) = found(skeleton, relabelled(markers, ("R.Knee.Lat", "L.Knee.Lat")))
+    assert (finding.code, set(finding.where.markers)) == ("L212", {"R.Knee.Lat", "L.Knee.Lat"})
 
 
 def test_another_unit_is_no_swap(made):
     skeleton, markers = made
-    (one,) = found(skeleton, replace(markers, positions=markers.positions / 0.0254 * 0.1))
-    assert one.code == "R106"
-    assert one.evidence["rms_m"].value > 0.08
+    (finding,) = found(skeleton, replace(markers, positions=markers.positions / 0.0254 * 0.1))
+    assert finding.code == "R106"
+    assert finding.evidence["rms_m"].value > 0.08
 
 
 def test_arms_never_shown_do_not_hinder(made):
@@ -127,8 +127,8 @@ def test_no_complete_frame(made):
     for frames, segment in ((slice(0, 12), "foot_r"), (slice(8, 20), "forearm_l")):
         columns = [i for i, m in enumerate(skeleton.markers) if m.segment == segment]
         positions[frames, columns] = np.nan
-    (one,) = found(skeleton, Markers(markers.time, markers.labels, positions))
-    assert (one.code, one.where.part) == ("R103", "ankle_angle_r")
+    (finding,) = found(skeleton, Markers(markers.time, markers.labels, positions))
+    assert (finding.code, finding.where.part) == ("R103", "ankle_angle_r")
 
 
 def test_straight_elbows_hide_no_frame(made):
@@ -139,5 +139,5 @@ def test_straight_elbows_hide_no_frame(made):
     straight = replace(markers, positions=skeleton.marker_positions(skeleton.pose(motion.q)))
     few = straight.select([label for label in markers.labels if not label.endswith("Bicep")])
     assert found(skeleton, few) == []
-    (one,) = found(skeleton, relabelled(few, ("L.Heel", "R.Heel")))
-    assert one.code == "L212"
+    (finding,) = found(skeleton, relabelled(few, ("L.Heel", "R.Heel")))
+    assert finding.code == "L212"

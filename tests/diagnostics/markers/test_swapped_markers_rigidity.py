@@ -89,12 +89,12 @@ def test_fault_free_trials(name, recording_of):
 @pytest.mark.parametrize(("name", "pairs", "where"), EXCHANGED)
 def test_swapped_labels(name, pairs, where, recording_of):
     markers, marker_set = read(recording_of, name)
-    torn = [one for one in found(relabelled(markers, *pairs), marker_set) if one.code == "L213"]
+    torn = [finding for finding in found(relabelled(markers, *pairs), marker_set) if finding.code == "L213"]
     assert torn
     swapped = {label for pair in pairs for label in pair}
-    assert all(swapped & set(one.where.markers) for one in torn)
-    assert any(where in one.evidence["segment"].value for one in torn)
-    assert {one.severity for one in torn} == {Severity.ERROR}
+    assert all(swapped & set(finding.where.markers) for finding in torn)
+    assert any(where in finding.evidence["segment"].value for finding in torn)
+    assert {finding.severity for finding in torn} == {Severity.ERROR}
 
 
 @pytest.mark.parametrize("sd_m", [0.004, 0.01, 0.02])
@@ -123,7 +123,7 @@ def test_a_warning_about_one_marker_hides_no_error_about_others(name, fault, rec
     assert found(spoilt, marker_set) == []
     torn = found(relabelled(spoilt, ("RTIB", "LTIB")), marker_set)
     assert "L213" in codes(torn)
-    assert {"RTIB", "LTIB"} <= {label for one in torn for label in one.where.markers}
+    assert {"RTIB", "LTIB"} <= {label for finding in torn for label in finding.where.markers}
 
 
 def with_soft_thigh(recording_of, name):
@@ -147,7 +147,7 @@ def test_soft_thighs_are_no_exchanged_labels(name, recording_of):
         np.linalg.norm(place[:, markers.labels.index("R.TH1")] - place[:, markers.labels.index(k)], axis=1)
         for k in ("R.Knee", "R.TH2", "R.TH3")
     ]
-    assert max(np.ptp(np.nanquantile(one, [0.1, 0.9])) for one in apart) > 0.06
+    assert max(np.ptp(np.nanquantile(distances, [0.1, 0.9])) for distances in apart) > 0.06
     assert found(markers, marker_set) == []
 
 
@@ -155,7 +155,9 @@ def test_soft_thighs_are_no_exchanged_labels(name, recording_of):
 def test_what_a_marker_goes_with_instead(name, recording_of):
     markers, marker_set = read(recording_of, name)
     torn = found(relabelled(markers, ("RTIB", "LTIB")), marker_set)
-    better = {one.where.markers[0]: one.evidence["better_segment"].value for one in torn if one.code == "L213"}
+    better = {
+        finding.where.markers[0]: finding.evidence["better_segment"].value for finding in torn if finding.code == "L213"
+    }
     assert better["RTIB"] in ("left thigh", "left shank")
     assert better["LTIB"] in ("right thigh", "right shank")
 
@@ -165,8 +167,10 @@ def test_whole_segments_of_the_other_leg(name, segment, recording_of):
     markers, marker_set = read(recording_of, name)
     right, left = (sorted(marker_set.segments[f"{segment}_{side}"]) for side in "rl")
     crossed = [
-        one for one in found(relabelled(markers, *zip(right, left, strict=True)), marker_set) if one.code == "L214"
+        finding
+        for finding in found(relabelled(markers, *zip(right, left, strict=True)), marker_set)
+        if finding.code == "L214"
     ]
-    assert [one.evidence["segments"].value for one in crossed] == [{"foot": "feet"}.get(segment, f"{segment}s")]
+    assert [finding.evidence["segments"].value for finding in crossed] == [{"foot": "feet"}.get(segment, f"{segment}s")]
     assert {*right, *left} & set(markers.labels) <= set(crossed[0].where.markers)
     assert crossed[0].evidence["crossed_change_m"].value < 0.7 * crossed[0].evidence["own_change_m"].value

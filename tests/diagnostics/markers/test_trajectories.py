@@ -27,7 +27,7 @@ def found(question, markers, **options):
 
 
 def everything(markers):
-    return [one for question in (trajectories, frames, label_swaps) for one in found(question, markers)]
+    return [answer for question in (trajectories, frames, label_swaps) for answer in found(question, markers)]
 
 
 def noisy(sd_m):
@@ -51,12 +51,12 @@ def test_spikes_are_errors_where_a_marker_has_several(is_static):
         places[40::20, 1, 1] += 0.3
 
     *few, often = found(trajectories, changed(walking(), spike), is_static=is_static)
-    assert {one.code for one in few} <= {"M111"}
+    assert {finding.code for finding in few} <= {"M111"}
     assert (often.code, often.severity, often.where.markers) == ("M111", Severity.ERROR, ("B",))
     assert often.evidence["frames"].value == 8
     assert often.evidence["first_s"].value == pytest.approx(0.4)
     assert often.evidence["distance_m"].value == pytest.approx(0.3, abs=0.01)
-    assert [(one.severity, one.where.markers, one.evidence["frames"].value) for one in few] == (
+    assert [(finding.severity, finding.where.markers, finding.evidence["frames"].value) for finding in few] == (
         [] if is_static else [(Severity.WARNING, ("A",), 2.0)]
     )
 
@@ -68,8 +68,8 @@ def test_at_lower_rates_spikes_may_be_larger(rate_hz, size_m, severity):
     def spike(places, time):
         places[20::20, 0, 2] += size_m
 
-    (one,) = found(trajectories, changed(walking(rate_hz=rate_hz), spike))
-    assert (one.code, one.severity) == ("M111", severity)
+    (finding,) = found(trajectories, changed(walking(rate_hz=rate_hz), spike))
+    assert (finding.code, finding.severity) == ("M111", severity)
 
 
 def test_the_marker_of_a_sprinter_at_25_frames_a_second_is_no_spike():
@@ -90,7 +90,7 @@ def test_jumps(size_m):
     first, second = found(trajectories, changed(walking(), jump))
     assert (first.code, first.where.markers, first.severity) == ("M112", ("B",), Severity.WARNING)
     assert first.evidence["step_m"].value == pytest.approx(abs(size_m), abs=0.002)
-    assert [one.evidence["time_s"].value for one in (first, second)] == pytest.approx([1.01, 1.51])
+    assert [finding.evidence["time_s"].value for finding in (first, second)] == pytest.approx([1.01, 1.51])
 
 
 @pytest.mark.parametrize("rate_hz", [60.0, 100.0, 250.0])
@@ -113,17 +113,17 @@ def test_a_marker_that_comes_back_at_once_does_not_jump(rate_hz, shape):
 def test_missing_frames(count):
     markers = walking()
     kept = np.r_[0:60, 60 + count : 200]  # while the markers are fast
-    (one,) = found(frames, Markers(markers.time[: len(kept)], markers.labels, markers.positions[kept]))
-    assert (one.code, one.severity) == ("M121", Severity.ERROR)
-    assert one.where.span_s == pytest.approx((0.59, 0.6))
-    assert one.evidence["frames"].value == pytest.approx(count, rel=0.3)
+    (finding,) = found(frames, Markers(markers.time[: len(kept)], markers.labels, markers.positions[kept]))
+    assert (finding.code, finding.severity) == ("M121", Severity.ERROR)
+    assert finding.where.span_s == pytest.approx((0.59, 0.6))
+    assert finding.evidence["frames"].value == pytest.approx(count, rel=0.3)
 
 
 def test_every_cut_is_found():
     markers = walking()
     kept = np.r_[0:60, 70:120, 130:200]
     cuts = found(frames, Markers(markers.time[: len(kept)], markers.labels, markers.positions[kept]))
-    assert [one.evidence["time_s"].value for one in cuts] == pytest.approx([0.6, 1.1])
+    assert [finding.evidence["time_s"].value for finding in cuts] == pytest.approx([0.6, 1.1])
 
 
 def test_lower_rates_are_allowed_larger_steps():
@@ -140,8 +140,8 @@ def test_every_swap_of_labels_is_found():
 
     swaps = found(label_swaps, changed(walking(), swap))
     assert codes(swaps) == ["L211", "L211"]
-    assert {one.where.markers for one in swaps} == {("A", "B")}
-    assert [one.evidence["time_s"].value for one in swaps] == pytest.approx([0.71, 1.1])
+    assert {finding.where.markers for finding in swaps} == {("A", "B")}
+    assert [finding.evidence["time_s"].value for finding in swaps] == pytest.approx([0.71, 1.1])
     assert swaps[0].evidence["distance_m"].value == pytest.approx(0.52, abs=0.01)
 
 
@@ -160,9 +160,9 @@ def test_every_filled_interval_is_found(line, code, step_m):
             places[:] = np.round(places / step_m) * step_m
 
     markers = changed(walking(), fill)
-    intervals = [one for one in found(trajectories, markers) if one.code == code]
-    assert [one.where.markers for one in intervals] == [("A",), ("A",)]
-    spans = np.array([one.where.span_s for one in intervals])
+    intervals = [finding for finding in found(trajectories, markers) if finding.code == code]
+    assert [finding.where.markers for finding in intervals] == [("A",), ("A",)]
+    spans = np.array([finding.where.span_s for finding in intervals])
     assert spans == pytest.approx(np.array([(0.5, 0.9), (1.1, 1.5)]), abs=0.03)
     assert found(trajectories, markers, is_static=True) == []
 
@@ -172,11 +172,13 @@ def test_two_labels_of_one_marker(frames, severity):
     def merge(places, time):
         places[20 : 20 + frames, 1] = places[20 : 20 + frames, 0] + [0.0, 0.001, 0.0]
 
-    same = [one for one in found(trajectories, changed(walking(), merge)) if one.code == "M115"]
-    assert [(one.severity, one.where.markers) for one in same] == ([] if severity is None else [(severity, ("A", "B"))])
-    for one in same:
-        assert one.where.span_s == pytest.approx((0.2, 0.19 + frames / 100))
-        assert one.evidence["distance_m"].value == pytest.approx(0.001)
+    same = [finding for finding in found(trajectories, changed(walking(), merge)) if finding.code == "M115"]
+    assert [(finding.severity, finding.where.markers) for finding in same] == (
+        [] if severity is None else [(severity, ("A", "B"))]
+    )
+    for finding in same:
+        assert finding.where.span_s == pytest.approx((0.2, 0.19 + frames / 100))
+        assert finding.evidence["distance_m"].value == pytest.approx(0.001)
 
 
 def test_a_single_frame_is_no_while():

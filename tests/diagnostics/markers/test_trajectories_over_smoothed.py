@@ -37,7 +37,7 @@ def test_markers_low_passed_far_too_strongly(recording_of, name, cutoff_hz):
     assert (found.code, found.severity) == ("M133", Severity.ERROR)
     assert found.evidence["share"].value < found.evidence["share"].limit
     # what follows from it is not said beside it
-    assert not {one[:3] for one in codes(found_in(context))} & {"P21", "P22", "P23"}
+    assert not {code[:3] for code in codes(found_in(context))} & {"P21", "P22", "P23"}
     assert [*over_smoothed(context_of(low_passed(walk, 6.0)))] == []
 
 

@@ -45,8 +45,12 @@ def test_a_point_between_two_markers_of_a_joint(recording_of, name):
     markers, elbow = recording_of(name).markers, ELBOWS[name]
     marker_set = marker_set_for(markers.labels)
     middle = markers.select(elbow).positions.mean(axis=1)
-    (one,) = computed(*with_point(markers, marker_set, "upper_arm_r", middle))
-    assert (one.code, one.where.markers, one.evidence["sources"].value) == ("M151", ("centre",), ", ".join(elbow))
+    (finding,) = computed(*with_point(markers, marker_set, "upper_arm_r", middle))
+    assert (finding.code, finding.where.markers, finding.evidence["sources"].value) == (
+        "M151",
+        ("centre",),
+        ", ".join(elbow),
+    )
     noisy = middle + np.random.default_rng(100).normal(0.0, 5e-4, middle.shape)
     assert computed(*with_point(markers, marker_set, "upper_arm_r", noisy)) == []
 
@@ -61,9 +65,9 @@ def test_a_point_in_axes_through_three_pelvis_markers(recording_of, name):
     y = np.cross(z, origin - (back_r + back_l) / 2)
     y /= np.linalg.norm(y, axis=1, keepdims=True)
     hip = origin - 0.05 * np.cross(y, z) - 0.08 * y + 0.09 * z
-    (one,) = computed(*with_point(markers, marker_set, "thigh_r", hip))
-    assert (one.code, one.where.markers) == ("M151", ("centre",))
-    assert one.evidence["sources"].value.startswith("RASI, LASI, ")
+    (finding,) = computed(*with_point(markers, marker_set, "thigh_r", hip))
+    assert (finding.code, finding.where.markers) == ("M151", ("centre",))
+    assert finding.evidence["sources"].value.startswith("RASI, LASI, ")
     on_skin = hip + np.random.default_rng(100).normal(0.0, 5e-4, hip.shape)
     assert computed(*with_point(markers, marker_set, "thigh_r", on_skin)) == []
 
@@ -80,12 +84,12 @@ def test_hip_centres_by_a_rigid_fit_of_the_pelvis(noise_m, recording_of):
     pelvis = markers.select(marker_set.segments["pelvis"]).positions
     standing = recording_of("synthetic/clusters_static.trc").markers
     shape = standing.select(marker_set.segments["pelvis"]).positions.mean(axis=0)
-    turns = [Rotation.align_vectors(one - one.mean(axis=0), shape - shape.mean(axis=0))[0] for one in pelvis]
+    turns = [Rotation.align_vectors(points - points.mean(axis=0), shape - shape.mean(axis=0))[0] for points in pelvis]
     for k, hip in enumerate(HIPS_M):
         place = pelvis.mean(axis=1) + np.array([turn.apply(hip) for turn in turns])
         place += np.random.default_rng(100 + k).normal(0.0, noise_m, place.shape)
         markers, marker_set = with_point(markers, marker_set, "thigh_r", place, f"hip {k}")
-    found = [one.where.markers for one in computed(markers, marker_set)]
+    found = [finding.where.markers for finding in computed(markers, marker_set)]
     assert found == ([("hip 0",), ("hip 1",)] if noise_m == 0.0 else [])
 
 
@@ -99,7 +103,7 @@ def test_hip_centres_that_another_laboratory_computed(trial, recording_of):
     thigh = (*marker_set.segments["thigh_r"], "R_HJC", "L_HJC")
     found = computed(markers, replace(marker_set, segments={**marker_set.segments, "thigh_r": thigh}))
     assert codes(found) == ["M151", "M151"]
-    assert [one.where.markers for one in found] == [("L_HJC",), ("R_HJC",)]
+    assert [finding.where.markers for finding in found] == [("L_HJC",), ("R_HJC",)]
 
 
 def test_too_short_or_too_few_markers_say_nothing(walk):

@@ -27,7 +27,7 @@ def found(markers, marker_set=SET, **options):
 
 def test_gaps():
     markers = markers_of(SET.labels, LKNE=slice(0, 100), RTHI=slice(0, 60), RHEE=slice(20, 40), LHEE=slice(50, 59))
-    never, rare, gap = sorted(found(markers), key=lambda one: one.code)
+    never, rare, gap = sorted(found(markers), key=lambda finding: finding.code)
     assert (never.code, never.where.markers) == ("M101", ("LKNE",))
     assert (rare.code, rare.where.markers, rare.evidence["share"].value) == ("M102", ("RTHI",), 0.4)
     assert (gap.code, gap.where.markers) == ("M103", ("RHEE",))
@@ -41,14 +41,14 @@ def test_gaps():
 def test_segments_without_markers(segment, words):
     """Neither arms nor a trunk need be seen."""
     labels = tuple(label for label in SET.labels if label not in SET.segments[segment])
-    parts = [one.where.part for one in found(markers_of(labels)) if one.code == "M104"]
+    parts = [finding.where.part for finding in found(markers_of(labels)) if finding.code == "M104"]
     assert parts == words
 
 
 def test_a_trunk_that_the_static_trial_shows_has_to_be_seen():
     labels = tuple(label for label in SET.labels if label not in TRUNK)
     static = context_of(markers_of(SET.labels), SET)
-    assert [one.where.part for one in found(markers_of(labels), static=static)] == ["torso"]
+    assert [finding.where.part for finding in found(markers_of(labels), static=static)] == ["torso"]
     assert found(markers_of(labels), static=context_of(markers_of(labels), SET)) == []
 
 
@@ -59,4 +59,4 @@ def test_a_foot_whose_markers_are_never_seen():
 
 def test_a_model_needs_markers_on_both_feet():
     model = MarkerSet("scaled.osim", {}, {"foot_r": ("A",), "foot_l": (), "toes": ("B",)}, {})
-    assert [one.where.part for one in found(markers_of(("A",)), model)] == ["left foot"]
+    assert [finding.where.part for finding in found(markers_of(("A",)), model)] == ["left foot"]

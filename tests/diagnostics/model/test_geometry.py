@@ -20,14 +20,14 @@ def found(skeleton: Skeleton) -> list[tuple[str, str, str, float]]:
     """Code, the right and the left joint or axis, and by how much they do not mirror: degrees or mm."""
     return [
         (
-            one.code,
-            one.evidence["right"].value,
-            one.evidence["left"].value,
-            round(np.degrees(one.evidence["angle_rad"].value))
-            if one.code == "O302"
-            else round(1e3 * one.evidence["distance_m"].value),
+            finding.code,
+            finding.evidence["right"].value,
+            finding.evidence["left"].value,
+            round(np.degrees(finding.evidence["angle_rad"].value))
+            if finding.code == "O302"
+            else round(1e3 * finding.evidence["distance_m"].value),
         )
-        for one in mirrored_joints(with_model(skeleton, upright.bsp()))
+        for finding in mirrored_joints(with_model(skeleton, upright.bsp()))
     ]
 
 
@@ -73,7 +73,7 @@ def test_a_knee_with_a_body_more_than_the_other_is_not_compared():
     (knee,) = [joint for joint in skeleton.joints if joint.child == "tibia_r"]
     plateau = replace(knee, child="plateau_r")
     shank = Joint("plateau_r", "tibia_r", np.eye(3), np.zeros(3), ())
-    joints = [each for joint in skeleton.joints for each in ((plateau, shank) if joint is knee else (joint,))]
+    joints = [part for joint in skeleton.joints for part in ((plateau, shank) if joint is knee else (joint,))]
     assert found(replace(skeleton, joints=tuple(joints))) == []
 
 
@@ -128,7 +128,9 @@ def test_a_subtalar_joint_with_the_frames_of_the_right(file_of, name):
     skeleton = read_osim(file_of(name)).skeleton
     (right,) = [joint for joint in skeleton.joints if joint.child == f"{heel}_r"]
     (left,) = [joint for joint in skeleton.joints if joint.child == f"{heel}_l"]
-    axes = tuple(replace(own, direction=other.direction) for own, other in zip(left.axes, right.axes, strict=True))
+    axes = tuple(
+        replace(left_axis, direction=other.direction) for left_axis, other in zip(left.axes, right.axes, strict=True)
+    )
     copied = changed(skeleton, left.child, axes=axes, rotation=right.rotation, child_rotation=right.child_rotation)
     degrees = round(2.0 * np.degrees(np.arcsin(abs(axis[2]))))
     assert found(copied) == [("O302", "subtalar_angle_r", "subtalar_angle_l", degrees)]

@@ -16,7 +16,10 @@ from sound_models import MODELS
 def found(skeleton: Skeleton, bsp=None) -> list[tuple[str, str, float]]:
     """Code, what is too far apart, and by how much (m)."""
     context = with_model(skeleton, upright.bsp() if bsp is None else bsp)
-    return [(one.code, one.evidence["what"].value, one.evidence["length_m"].value) for one in length_unit(context)]
+    return [
+        (finding.code, finding.evidence["what"].value, finding.evidence["length_m"].value)
+        for finding in length_unit(context)
+    ]
 
 
 def as_large(factor: float) -> Skeleton:

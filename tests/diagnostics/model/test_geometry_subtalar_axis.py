@@ -45,9 +45,9 @@ def test_people(heading, sign, up, inward):
 @pytest.mark.parametrize("heading", [1.0, -1.0])
 @pytest.mark.parametrize(("axis", "degrees"), [((1, 0, 0), 38), ((0, 1, 0), 53), ((0.79, 0.6, 0.7), 42)])
 def test_an_axis_that_was_lost(heading, axis, degrees):
-    (one,) = subtalar_axis(with_model(with_axes(axis, heading), upright.bsp()))
-    assert (one.code, one.evidence["joints"].value) == ("O304", "talus_r_toes_r, talus_l_toes_l")
-    assert np.degrees(one.evidence["angle_rad"].value) == pytest.approx(degrees, abs=0.6)
+    (finding,) = subtalar_axis(with_model(with_axes(axis, heading), upright.bsp()))
+    assert (finding.code, finding.evidence["joints"].value) == ("O304", "talus_r_toes_r, talus_l_toes_l")
+    assert np.degrees(finding.evidence["angle_rad"].value) == pytest.approx(degrees, abs=0.6)
 
 
 @pytest.mark.parametrize("name", MODELS)

@@ -19,8 +19,12 @@ from upright_model import changed, with_moments
 def found(bsp, trials=()):
     """Code, body and severity of what speaks against mass properties and is not explained by another."""
     context = replace(with_model(upright.skeleton(), bsp), trials=trials)
-    questions = [one for one in MODEL_CHECKS if one.codes[0].startswith("O20")]
-    return {(one.code, one.where.part, one.severity) for one in explained(asked(questions, context)) if one.is_open}
+    questions = [check for check in MODEL_CHECKS if check.codes[0].startswith("O20")]
+    return {
+        (finding.code, finding.where.part, finding.severity)
+        for finding in explained(asked(questions, context))
+        if finding.is_open
+    }
 
 
 def ball(mass_kg, density_kg_m3):
@@ -41,8 +45,8 @@ def test_a_possible_model():
 )
 def test_masses_in_another_unit_are_one_error(mass, inertia, expected, trials):
     """In grams they were 22 warnings about inertias, and the fit scaled the masses and went on."""
-    own = upright.bsp()
-    bsp = BodySegmentParameters(own.segments, mass * own.mass_kg, own.com_m, inertia * own.inertia_kgm2)
+    usual = upright.bsp()
+    bsp = BodySegmentParameters(usual.segments, mass * usual.mass_kg, usual.com_m, inertia * usual.inertia_kgm2)
     assert (found(bsp, trials) == {("O206", None, Severity.ERROR)}) == expected
 
 
@@ -60,8 +64,8 @@ def test_what_no_distribution_of_mass_has(change, condition):
     bsp = changed("femur_r", **change)
     assert ("O201", "femur_r", Severity.ERROR) in found(bsp)
     context = with_model(upright.skeleton(), bsp)
-    (one,) = (each for each in asked(MODEL_CHECKS, context) if each.code == "O201")
-    assert condition in one.evidence["condition"].value
+    (finding,) = (reported for reported in asked(MODEL_CHECKS, context) if reported.code == "O201")
+    assert condition in finding.evidence["condition"].value
     if "mass" not in change:
         assert ("O201", "femur_r", Severity.ERROR) in found(bsp, [UNMOVED])
 
@@ -76,10 +80,12 @@ def test_bodies_that_a_fit_does_not_estimate():
 @pytest.mark.parametrize(("density", "codes"), [(1000.0, set()), (4990.0, set()), (8000.0, {"O203"})])
 def test_a_ball_is_as_dense_as_it_is(density, codes):
     assert {code for code, _, _ in found(ball(5.0, density))} == codes
-    (one, *_) = [
-        each for each in asked(MODEL_CHECKS, with_model(upright.skeleton(), ball(5.0, 8000.0))) if each.code == "O203"
+    (finding, *_) = [
+        reported
+        for reported in asked(MODEL_CHECKS, with_model(upright.skeleton(), ball(5.0, 8000.0)))
+        if reported.code == "O203"
     ]
-    assert one.evidence["density_kg_m3"].value == pytest.approx(8000.0)
+    assert finding.evidence["density_kg_m3"].value == pytest.approx(8000.0)
 
 
 def test_light_bodies_are_not_dense():
@@ -113,5 +119,5 @@ def test_models_in_use(file_of, name):
     """With trials none has a fault of bodies that are estimated."""
     model = read_osim(file_of(name))
     context = replace(with_model(model.skeleton, model.bsp), trials=[UNMOVED])
-    questions = [one for one in MODEL_CHECKS if one.codes[0].startswith(("O20", "O21", "O30"))]
-    assert [one for one in asked(questions, context) if one.severity > Severity.INFO] == []
+    questions = [check for check in MODEL_CHECKS if check.codes[0].startswith(("O20", "O21", "O30"))]
+    assert [finding for finding in asked(questions, context) if finding.severity > Severity.INFO] == []

@@ -20,13 +20,13 @@ PERSON = {"mass_kg": upright.MASS_KG, "height_m": upright.HEIGHT_M, "sex": uprig
 
 def findings(bsp=None, arms=True, trials=(), **person):
     """Of a model beside this person, those that no other one explains."""
-    own = upright.bsp(arms) if bsp is None else bsp
-    context = replace(with_model(upright.skeleton(arms), own, **person), trials=trials)
-    return [one for one in explained(asked(MODEL_CHECKS, context)) if one.is_open]
+    body = upright.bsp(arms) if bsp is None else bsp
+    context = replace(with_model(upright.skeleton(arms), body, **person), trials=trials)
+    return [finding for finding in explained(asked(MODEL_CHECKS, context)) if finding.is_open]
 
 
 def answers(code, *arguments, **more):
-    return [one for one in findings(*arguments, **more) if one.code == code]
+    return [finding for finding in findings(*arguments, **more) if finding.code == code]
 
 
 def test_dumas_own_model_has_nothing_against_it():
@@ -34,11 +34,11 @@ def test_dumas_own_model_has_nothing_against_it():
 
 
 def test_what_is_not_known_of_the_person_is_left_out():
-    (one,) = findings()
-    assert (one.code, one.severity) == ("O415", Severity.INFO)
-    assert "mass and stature and sex" in one.evidence["reason"].value
-    (one,) = findings(mass_kg=75.0, height_m=1.77)
-    assert "sex not stated" in one.evidence["reason"].value
+    (finding,) = findings()
+    assert (finding.code, finding.severity) == ("O415", Severity.INFO)
+    assert "mass and stature and sex" in finding.evidence["reason"].value
+    (finding,) = findings(mass_kg=75.0, height_m=1.77)
+    assert "sex not stated" in finding.evidence["reason"].value
     assert answers("O415", trials=[UNMOVED]) == [], "nobody asked for a comparison"
 
 
@@ -52,8 +52,8 @@ def test_what_is_not_known_of_the_person_is_left_out():
 )
 def test_placeholders(moments, pattern):
     found = answers("O211", with_moments("talus_r", *moments))
-    assert [one.evidence["pattern"].value for one in found] == ([] if pattern is None else [pattern])
-    assert {one.where.part for one in found} <= {"talus_r"}
+    assert [finding.evidence["pattern"].value for finding in found] == ([] if pattern is None else [pattern])
+    assert {finding.where.part for finding in found} <= {"talus_r"}
 
 
 @pytest.mark.parametrize(
@@ -67,30 +67,30 @@ def test_placeholders(moments, pattern):
 def test_total_mass(mass_kg, alone, fitted):
     """A fit scales the masses."""
     stated = {**PERSON, "mass_kg": mass_kg}
-    assert [one.severity for one in answers("O213", **stated)] == alone
-    assert [one.severity for one in answers("O213", trials=[UNMOVED], **stated)] == fitted
+    assert [answer.severity for answer in answers("O213", **stated)] == alone
+    assert [answer.severity for answer in answers("O213", trials=[UNMOVED], **stated)] == fitted
 
 
 def test_legs_without_a_trunk_are_not_scaled_to_the_whole_mass():
     """Thighs and shanks would be twice as heavy as they are."""
     zero = dict.fromkeys(PARAMETERS, 0.0)
-    (one,) = answers("O213", changed("torso", **zero), trials=[UNMOVED], **PERSON)
-    assert one.severity is Severity.ERROR
-    own = upright.bsp()
-    table = own.table()
-    pelvis, torso = (own.segments.index(name) for name in ("pelvis", "torso"))
+    (finding,) = answers("O213", changed("torso", **zero), trials=[UNMOVED], **PERSON)
+    assert finding.severity is Severity.ERROR
+    body = upright.bsp()
+    table = body.table()
+    pelvis, torso = (body.segments.index(name) for name in ("pelvis", "torso"))
     table[pelvis, 0], table[torso] = table[pelvis, 0] + table[torso, 0], 0.0
-    in_pelvis = BodySegmentParameters.from_table(own.segments, table)
+    in_pelvis = BodySegmentParameters.from_table(body.segments, table)
     assert answers("O213", in_pelvis, trials=[UNMOVED], **PERSON) == []
 
 
 def test_left_and_right():
     bsp = upright.bsp()
     mass = bsp.mass_kg[bsp.segments.index("tibia_r")]
-    (one,) = answers("O214", changed("tibia_r", mass=1.05 * mass, com_z=0.02))
-    assert one.where.part == "tibia"
-    assert one.evidence["mass_share"].value == pytest.approx(0.05, abs=0.005)
-    assert one.evidence["com_m"].value > 0.015
+    (finding,) = answers("O214", changed("tibia_r", mass=1.05 * mass, com_z=0.02))
+    assert finding.where.part == "tibia"
+    assert finding.evidence["mass_share"].value == pytest.approx(0.05, abs=0.005)
+    assert finding.evidence["com_m"].value > 0.015
 
 
 def test_segments_unlike_the_literature():
@@ -101,22 +101,22 @@ def test_segments_unlike_the_literature():
         table[bsp.segments.index(f"femur_{side}"), [0, *range(4, 10)]] *= 2.5
     heavy = BodySegmentParameters.from_table(bsp.segments, table)
     found = answers("O212", heavy, **PERSON)
-    assert [(one.where.part, one.severity) for one in found] == [
+    assert [(finding.where.part, finding.severity) for finding in found] == [
         ("femur_r", Severity.WARNING),
         ("femur_l", Severity.WARNING),
     ]
-    for one in found:
-        assert one.evidence["value"].value > one.evidence["table_high"].value
+    for finding in found:
+        assert finding.evidence["value"].value > finding.evidence["table_high"].value
     scaled = replace(heavy, mass_kg=heavy.mass_kg * 75.0 / heavy.total_mass_kg)
-    assert {one.severity for one in answers("O212", scaled, trials=[UNMOVED], **PERSON)} == {Severity.INFO}
+    assert {answer.severity for answer in answers("O212", scaled, trials=[UNMOVED], **PERSON)} == {Severity.INFO}
 
 
 def test_torso_with_the_arms_inertia():
     """Rajagopal's torso, on this model; without arms as bodies it may."""
     bsp = changed("torso", mass=26.8266, ixx=1.4745, iyy=0.7555, izz=1.4314, ixy=0, ixz=0, iyz=0)
-    (one,) = answers("O215", bsp, **PERSON)
-    assert one.evidence["ratio"].value == pytest.approx(0.52, abs=0.01)
-    assert "torso" not in [each.where.part for each in answers("O212", bsp, **PERSON)], "which explains it"
+    (finding,) = answers("O215", bsp, **PERSON)
+    assert finding.evidence["ratio"].value == pytest.approx(0.52, abs=0.01)
+    assert "torso" not in [reported.where.part for reported in answers("O212", bsp, **PERSON)], "which explains it"
     kept = [name for name in bsp.segments if not name.startswith(("humerus", "ulna", "hand"))]
     bare = BodySegmentParameters.from_table(kept, [bsp.table()[bsp.segments.index(name)] for name in kept])
     assert answers("O215", bare, False) == []
@@ -126,15 +126,15 @@ def test_without_arms_the_torso_weighs_torso_and_arms():
     bsp = upright.bsp(arms=False)
     mass = np.array(bsp.mass_kg)
     mass[bsp.segments.index("torso")] += upright.bsp().total_mass_kg - bsp.total_mass_kg
-    (one,) = findings(replace(bsp, mass_kg=mass), False, **PERSON)
-    assert one.code == "O415"
-    assert "no arms" in one.evidence["reason"].value
+    (finding,) = findings(replace(bsp, mass_kg=mass), False, **PERSON)
+    assert finding.code == "O415"
+    assert "no arms" in finding.evidence["reason"].value
 
 
 def test_mass_centres_in_millimetres():
     bsp = upright.bsp()
-    (one,) = answers("O301", replace(bsp, com_m=1000.0 * bsp.com_m))
-    assert (one.severity, "torso" in one.evidence["what"].value) == (Severity.ERROR, True)
+    (finding,) = answers("O301", replace(bsp, com_m=1000.0 * bsp.com_m))
+    assert (finding.severity, "torso" in finding.evidence["what"].value) == (Severity.ERROR, True)
 
 
 def test_a_model_without_markers():
@@ -142,17 +142,17 @@ def test_a_model_without_markers():
     bare = replace(upright.skeleton(), markers=())
     alone = asked(MODEL_CHECKS, with_model(bare, upright.bsp(), **PERSON))
     fitted = asked(MODEL_CHECKS, replace(with_model(bare, upright.bsp(), **PERSON), trials=[UNMOVED]))
-    assert [one.severity for one in alone if one.code == "O106"] == [Severity.INFO]
-    assert [one.severity for one in fitted if one.code == "O106"] == [Severity.ERROR]
+    assert [finding.severity for finding in alone if finding.code == "O106"] == [Severity.INFO]
+    assert [finding.severity for finding in fitted if finding.code == "O106"] == [Severity.ERROR]
 
 
 def test_a_model_without_a_foot():
     without = replace(upright.skeleton(), joints=upright.skeleton().joints[:2])
     bsp = upright.bsp()
     rows = [bsp.segments.index(name) for name in without.segments]
-    own = BodySegmentParameters.from_table(without.segments, bsp.table()[rows])
-    found = asked(MODEL_CHECKS[:1], replace(with_model(without, own), trials=[UNMOVED]))
-    assert [(one.code, one.where.part) for one in found] == [("O107", "right foot"), ("O107", "left foot")]
+    body = BodySegmentParameters.from_table(without.segments, bsp.table()[rows])
+    found = asked(MODEL_CHECKS[:1], replace(with_model(without, body), trials=[UNMOVED]))
+    assert [(finding.code, finding.where.part) for finding in found] == [("O107", "right foot"), ("O107", "left foot")]
 
 
 KNOWN = {
@@ -174,5 +174,5 @@ def test_models_in_use(file_of, name):
     person, codes = KNOWN[name]
     model = read_osim(file_of(name))
     found = asked(MODEL_CHECKS, with_model(model.skeleton, model.bsp, **person))
-    assert max(one.severity for one in found) <= Severity.WARNING
-    assert {one.code for one in found if one.severity == Severity.WARNING} == codes
+    assert max(finding.severity for finding in found) <= Severity.WARNING
+    assert {finding.code for finding in found if finding.severity == Severity.WARNING} == codes

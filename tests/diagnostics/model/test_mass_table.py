@@ -39,9 +39,9 @@ def test_bodies_where_the_person_is_not_known():
     assert model_check.literature == {}
     assert [row[0] for row in model_check.rows()] == list(upright.bsp().segments)
     assert check(person=(75.0, 1.77, None)).literature == {}
-    own = check(person=(None, 1.77, "male"))
-    assert own.literature
-    assert own.rows()[0][2:] == check().rows()[0][2:]
+    overruled = check(person=(None, 1.77, "male"))
+    assert overruled.literature
+    assert overruled.rows()[0][2:] == check().rows()[0][2:]
 
 
 def test_left_and_right_are_shown_where_they_differ():
@@ -93,10 +93,10 @@ def test_literature_for_the_trunk_is_the_one_of_a_fit(file_of, harringtons_model
     trial, person, off = SCALED[name]
     static = read_recording(file_of(trial))
     hips = "harrington" if name == "synthetic" else "bell"
-    own = build_gait27(static, choose_marker_set(static.markers.labels), *person[1:], hips).geometry
+    built = build_gait27(static, choose_marker_set(static.markers.labels), *person[1:], hips).geometry
     model = read_osim(harringtons_model if name == "synthetic" else file_of(name))
     segments = model_segments(model.skeleton, model.bsp, *person[1:])
-    bodies = [literature_bsp(*person, geometry, source).table() for geometry in (segments.geometry, own)]
+    bodies = [literature_bsp(*person, geometry, source).table() for geometry in (segments.geometry, built)]
     pelvis, torso = SEGMENTS.index("pelvis"), SEGMENTS.index("torso")
     assert bodies[0][pelvis, 4:7] == pytest.approx(bodies[1][pelvis, 4:7], rel=off)
     assert bodies[0][torso, 4:7] == pytest.approx(bodies[1][torso, 4:7], rel=0.1)

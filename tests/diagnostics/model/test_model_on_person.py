@@ -52,10 +52,10 @@ def someone(request, file_of, recording_of):
 
 def found(model, walk, marker_set, positions=None):
     """Findings about a model, perhaps with other positions of its markers, that no other one explains."""
-    own = marker_set if positions is None else replace(marker_set, in_model=positions)
-    trial = RecordingContext(only_markers("walk", walk), own)
-    context = PersonContext(Subject(name="person"), [trial], None, own, model)
-    return [one for one in explained(model_and_trials(context)) if one.is_open]
+    used_set = marker_set if positions is None else replace(marker_set, in_model=positions)
+    trial = RecordingContext(only_markers("walk", walk), used_set)
+    context = PersonContext(Subject(name="person"), [trial], None, used_set, model)
+    return [finding for finding in explained(model_and_trials(context)) if finding.is_open]
 
 
 def relabelled(markers, exchanged):
@@ -69,17 +69,17 @@ def test_the_own_model(someone):
 @pytest.mark.parametrize("size", [0.92, 0.95, 1.05, 1.08])
 def test_the_model_of_a_person_of_another_size(someone, size):
     places = someone[2].in_model
-    (one,) = found(*someone, Markers(places.time, places.labels, size * places.positions))
-    assert one.code == "O404"
-    assert one.evidence["ratio"].value == pytest.approx(1.0 / size, abs=0.02)
-    assert one.severity is Severity.ERROR or abs(size - 1) < 0.06
+    (finding,) = found(*someone, Markers(places.time, places.labels, size * places.positions))
+    assert finding.code == "O404"
+    assert finding.evidence["ratio"].value == pytest.approx(1.0 / size, abs=0.02)
+    assert finding.severity is Severity.ERROR or abs(size - 1) < 0.06
 
 
 @pytest.mark.parametrize("factor", [1000.0, 0.001])
 def test_another_unit_of_length(someone, factor):
     places = someone[2].in_model
-    (one,) = found(*someone, Markers(places.time, places.labels, factor * places.positions))
-    assert one.code == "O401"
+    (finding,) = found(*someone, Markers(places.time, places.labels, factor * places.positions))
+    assert finding.code == "O401"
 
 
 def test_left_and_right_exchanged_in_all_labels(someone):
@@ -87,9 +87,12 @@ def test_left_and_right_exchanged_in_all_labels(someone):
     model, walk, marker_set = someone
     places = marker_set.in_model
     right = [label for label in places.labels if label[0] in "Rr"]
-    pairs = {one: {"R": "L", "r": "L" if f"L{one[1:]}" in places.labels else "l"}[one[0]] + one[1:] for one in right}
-    pairs = {one: other for one, other in pairs.items() if other in places.labels}
-    exchanged = relabelled(walk, pairs | {other: one for one, other in pairs.items()})
+    pairs = {
+        label: {"R": "L", "r": "L" if f"L{label[1:]}" in places.labels else "l"}[label[0]] + label[1:]
+        for label in right
+    }
+    pairs = {label: other for label, other in pairs.items() if other in places.labels}
+    exchanged = relabelled(walk, pairs | {other: label for label, other in pairs.items()})
     assert "O402" in codes(found(model, exchanged, marker_set))
     legs = replace(marker_set, segments=marker_set.segments | {"torso": ()})
     assert found(model, walk, legs) == []
@@ -113,15 +116,15 @@ def test_heel_and_another_marker_of_the_foot_exchanged(someone):
     model, walk, marker_set = someone
     foot = [label for label in marker_set.segments["foot_r"] if label in walk.labels]
     at = marker_set.in_model
-    one, other = max(
+    heel, other = max(
         ((a, b) for a in foot for b in foot if a < b),
         key=lambda pair: np.linalg.norm(np.subtract(*at.select(pair).positions[0])),
     )
-    swapped = [each for each in found(model, relabelled(walk, {one: other, other: one}), marker_set)]
+    swapped = [finding for finding in found(model, relabelled(walk, {heel: other, other: heel}), marker_set)]
     if len(foot) > 2:
         (swap,) = swapped
         assert (swap.code, swap.evidence["reference"].value) == ("L212", "model")
-        assert {one, other} & set(swap.where.markers)
+        assert {heel, other} & set(swap.where.markers)
 
 
 def test_markers_that_were_never_placed(someone):
@@ -141,9 +144,9 @@ def test_markers_that_calibration_moved_far(file_of):
             for marker in before.markers
         ]
     )
-    (one,) = moved_markers(before, after, [trial])
-    assert (one.code, one.where.markers, one.where.part) == ("O407", ("R.Heel",), "foot_r")
-    assert one.evidence["distance_m"].value == pytest.approx(0.08)
+    (finding,) = moved_markers(before, after, [trial])
+    assert (finding.code, finding.where.markers, finding.where.part) == ("O407", ("R.Heel",), "foot_r")
+    assert finding.evidence["distance_m"].value == pytest.approx(0.08)
     assert list(moved_markers(before, before, [trial])) == []
 
 
@@ -167,7 +170,7 @@ def clamped(trial, name, low, high):
 def test_legs_and_trunk_that_the_model_holds_back(trial, name, low, high):
     skeleton, ik = clamped(trial, name, low, high)
     found = list(range_findings(skeleton, ik))
-    assert [(one.code, one.where.part) for one in found[:2]] == [("O311", name), ("O312", name)]
+    assert [(finding.code, finding.where.part) for finding in found[:2]] == [("O311", name), ("O312", name)]
     assert found[0].evidence["range_rad"].value == pytest.approx(np.radians((low, high)))
     assert found[0].evidence["share"].value > 0.2
 
@@ -176,7 +179,7 @@ def test_sound_ranges_and_arms_are_not_doubted(trial):
     straight = np.degrees(np.quantile(trial.motion.q[:, trial.skeleton.coordinates.index("knee_angle_r")], 0.08))
     for name, low, high in (("knee_angle_r", -10.0, 120.0), ("knee_angle_r", straight, 120.0), ("arm_add_l", 5.0, 6.0)):
         skeleton, ik = clamped(trial, name, low, high)
-        assert [one for one in range_findings(skeleton, ik) if one.code == "O311"] == []
+        assert [finding for finding in range_findings(skeleton, ik) if finding.code == "O311"] == []
 
 
 def test_a_coordinate_beyond_its_usual_range(trial):
@@ -186,8 +189,9 @@ def test_a_coordinate_beyond_its_usual_range(trial):
     usual = Range(float(knee.min() - 0.1), most, clamped=False, stated=True)
     skeleton = replace(trial.skeleton, ranges={**trial.skeleton.ranges, "knee_angle_r": usual})
     found = [
-        one for one in range_findings(skeleton, SimpleNamespace(q=trial.motion.q, coordinates=skeleton.coordinates))
+        reported
+        for reported in range_findings(skeleton, SimpleNamespace(q=trial.motion.q, coordinates=skeleton.coordinates))
     ]
-    (one,) = (each for each in found if each.where.part == "knee_angle_r")
-    assert one.code == "O312"
-    assert np.degrees(one.evidence["beyond_rad"].value) == pytest.approx(20.0, abs=0.1)
+    (finding,) = (reported for reported in found if reported.where.part == "knee_angle_r")
+    assert finding.code == "O312"
+    assert np.degrees(finding.evidence["beyond_rad"].value) == pytest.approx(20.0, abs=0.1)

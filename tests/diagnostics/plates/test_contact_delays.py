@@ -65,12 +65,12 @@ def test_markers_that_flicker_do_not_change_how_long_feet_stand(walk, share):
 def test_a_foot_that_is_hidden_while_it_stands(walk, side):
     """For a third of a second in the middle of its longest load, with all its markers."""
     markers, plates = walk.markers, walk.plates
-    own = [markers.labels.index(label) for label in feet_of(walk)[side]]
+    columns = [markers.labels.index(label) for label in feet_of(walk)[side]]
     for vertical in plates.force[..., 1].T:
         middle = float(np.average(plates.time, weights=vertical > 200.0))
         positions = markers.positions.copy()
         hidden = np.abs(markers.time - middle) < 0.17
-        positions[np.ix_(hidden, own)] = np.nan
+        positions[np.ix_(hidden, columns)] = np.nan
         assert code_of(found_in(replace(walk, markers=replace(markers, positions=positions)))) != "T201"
 
 
@@ -176,6 +176,6 @@ def test_points_of_one_plate_in_mm(plate):
 
 def test_both_ends_of_loads_have_to_be_late(monkeypatch):
     """A plate that is left early, or a foot that drags, moves one end: of 60 ms on average 22.5 ms at least at each."""
-    assert [one.code for one in late_contacts(0.06, monkeypatch, uneven_s=0.036)] == ["T211"]
+    assert [finding.code for finding in late_contacts(0.06, monkeypatch, uneven_s=0.036)] == ["T211"]
     assert late_contacts(0.06, monkeypatch, uneven_s=0.039) == []
     assert late_contacts(-0.06, monkeypatch, uneven_s=0.039) == []

@@ -59,7 +59,9 @@ def shifted(recording, by_s):
 @pytest.mark.parametrize("offset_m", [0.05, -0.05])
 def test_offsets_across_the_walk(name, walk, offset_m):
     recording, feet = walk
-    (found,) = [one for one in place_findings(moved(recording, (0.0, 0.0, offset_m)), feet) if one.code == "P243"]
+    (found,) = [
+        finding for finding in place_findings(moved(recording, (0.0, 0.0, offset_m)), feet) if finding.code == "P243"
+    ]
     assert found.severity is Severity.WARNING
     assert found.evidence["offset_m"].value[1] == pytest.approx(offset_m + BESIDE_M.get(name, 0.0), abs=0.01)
 
@@ -91,9 +93,9 @@ def test_offsets_along_the_walk(name, walk, offset_m):
     recording, feet = walk
     ahead_m = 0.02 if name.startswith("synthetic") and offset_m > 0 else 0.0
     found = place_findings(moved(recording, (offset_m + ahead_m, 0.0, 0.0)), feet)
-    assert "P243" in [one.code for one in found if one.is_open]
-    along = [one.evidence["offset_m"].value for one in found if "begin_m" in one.evidence]
-    assert all(np.sign(one) == np.sign(offset_m * direction(recording)) for one in along)
+    assert "P243" in [finding.code for finding in found if finding.is_open]
+    along = [finding.evidence["offset_m"].value for finding in found if "begin_m" in finding.evidence]
+    assert all(np.sign(offset) == np.sign(offset_m * direction(recording)) for offset in along)
 
 
 def direction(recording):
@@ -104,9 +106,11 @@ def direction(recording):
 
 def test_points_in_mm(walk):
     recording, feet = walk
-    found = [one for one in place_findings(moved(recording, (0.0, 0.0, 0.0), factor=1000.0), feet) if one.is_open]
-    assert {one.code for one in found if one.severity is Severity.ERROR} == {"P204"}
-    assert min(one.evidence["distance_m"].value for one in found if one.code == "P204") > 5.0
+    found = [
+        finding for finding in place_findings(moved(recording, (0.0, 0.0, 0.0), factor=1000.0), feet) if finding.is_open
+    ]
+    assert {finding.code for finding in found if finding.severity is Severity.ERROR} == {"P204"}
+    assert min(finding.evidence["distance_m"].value for finding in found if finding.code == "P204") > 5.0
 
 
 @pytest.mark.parametrize("by_s", [-0.12, 0.09, 0.2])
@@ -142,8 +146,8 @@ def test_rates(name, walk, factor):
 def test_a_walk_on_one_long_plate(walk):
     """A load that goes from foot to foot is no long stance."""
     recording, feet = walk
-    one = on_one_plate(recording)
-    assert error_of(one, feet) is None
+    on_plate = on_one_plate(recording)
+    assert error_of(on_plate, feet) is None
 
 
 @pytest.mark.parametrize("name", SQUATS)
@@ -151,9 +155,9 @@ def test_squats_on_one_plate(recording_of, name):
     """The load is between the feet all the time: not of another trial, but both feet on one plate."""
     squats = recording_of(*SQUATS[name])
     feet = feet_of(squats)
-    one = on_one_plate(squats)
-    assert error_of(one, feet) is None
-    assert "P276" in doubted(one, feet)
+    on_plate = on_one_plate(squats)
+    assert error_of(on_plate, feet) is None
+    assert "P276" in doubted(on_plate, feet)
 
 
 @pytest.mark.parametrize("stride_m", [1.2, 0.9])
@@ -203,7 +207,7 @@ def test_both_feet_on_a_plate():
     """The left foot lands on the right foot's plate, and comes to its own later."""
     recording = simple_walk([("r", 0), ("l", 0)])
     wrong = with_left_foot_on_first_plate(recording, 0.7, 0.78)  # both are down from 0.7 to 0.8 s
-    (found,) = [one for one in place_findings(wrong, SIMPLE_FEET) if one.severity > Severity.CORRECTED]
+    (found,) = [finding for finding in place_findings(wrong, SIMPLE_FEET) if finding.severity > Severity.CORRECTED]
     assert (found.code, found.where.plate) == ("P276", "plate 1")
     assert found.where.span_s == pytest.approx((0.7, 0.78), abs=0.01)
 
@@ -223,7 +227,7 @@ def test_a_load_of_both_feet_is_no_measure_of_where_a_plate_is():
     """A child's second foot on the plate displaced it by 42 mm, and mirrored its centre of pressure."""
     shared = with_left_foot_on_first_plate(simple_walk([("r", 0), ("l", 0)]), 0.7, 0.85)
     context = context_of(shared, SIMPLE_FEET)
-    assert not {"P243", "P252"} & {one.code for one in place_findings(shared, SIMPLE_FEET)}
+    assert not {"P243", "P252"} & {finding.code for finding in place_findings(shared, SIMPLE_FEET)}
     before, after = context.trial.windows(), context.trial_on_plates.windows()
     assert max(end for _, end in before) > 0.75
     assert max(end for _, end in after if end < 0.85) <= 0.71
@@ -260,8 +264,8 @@ def test_loads_under_the_toes_of_somebody_who_walks_on_them():
 def test_both_feet_explain_feet_in_turn():
     """D20: one load is told once."""
     recording = simple_walk([("r", 0), ("l", 0)])
-    one = on_one_plate(recording)
-    found = {each.code: each.muted_by for each in place_findings(one, SIMPLE_FEET)}
+    on_plate = on_one_plate(recording)
+    found = {finding.code: finding.muted_by for finding in place_findings(on_plate, SIMPLE_FEET)}
     assert found == {"P275": "P276", "P276": None}
 
 
@@ -288,7 +292,7 @@ def along(recording, plate, share):
 @pytest.mark.parametrize(("share", "code", "size_m"), [(-1.5, "P252", -0.1), (0.0, "P251", 0.0)])
 def test_a_load_that_does_not_progress(share, code, size_m):
     recording = simple_walk([("r", 0), ("l", 0)])
-    (found,) = [one for one in place_findings(along(recording, 1, share), SIMPLE_FEET) if one.is_open]
+    (found,) = [finding for finding in place_findings(along(recording, 1, share), SIMPLE_FEET) if finding.is_open]
     assert (found.code, found.where.plate) == (code, "plate 2")
     assert next(iter(found.evidence.values())).value == pytest.approx(size_m, abs=0.03)
     assert doubted(along(recording, 1, 0.3), SIMPLE_FEET) == []
@@ -298,7 +302,7 @@ def test_a_mirrored_plate_under_short_feet():
     adult = along(simple_walk([("r", 0), ("l", 0)]), 1, -1.5)
     markers = replace(adult.markers, positions=0.6 * adult.markers.positions)
     child = replace(adult, markers=markers, plates=replace(adult.plates, moment=0.6 * adult.plates.moment))
-    (found,) = [one for one in place_findings(child, SIMPLE_FEET) if one.code == "P252"]
+    (found,) = [finding for finding in place_findings(child, SIMPLE_FEET) if finding.code == "P252"]
     assert found.evidence["progression_m"].value == pytest.approx(-0.06, abs=0.02)
 
 

@@ -30,8 +30,8 @@ def run(request, recording_of):
 
 def loaded(walk, marker_set=None):
     """What is found of its loads, P22 to P23 and P212, P214, T20: the vertical moment has tests of its own."""
-    own = ("P21", "P22", "P23", "T20", "M13", "P20")
-    return [one for one in found_in(context_of(walk, marker_set)) if one.code.startswith(own)]
+    families = ("P21", "P22", "P23", "T20", "M13", "P20")
+    return [reported for reported in found_in(context_of(walk, marker_set)) if reported.code.startswith(families)]
 
 
 @pytest.mark.parametrize("axis", [0, 2])
@@ -46,7 +46,7 @@ def test_the_sign_of_one_plate(walk, axis, plate):
     before, after = found.evidence["velocity_residual_m_s"].value
     assert after < min(0.65 * before, 0.85 * min(found.evidence["rivals_m_s"].value[:-1]))
     everywhere = [*force_directions(context_of(with_force(walk, lambda force: force * np.prod(signs, axis=0))))]
-    assert [one.code for one in everywhere] == ["P232"]
+    assert [reported.code for reported in everywhere] == ["P232"]
 
 
 @pytest.mark.parametrize("axis", [0, 2])
@@ -77,7 +77,9 @@ def misread(recording, plate, kind):
 @pytest.mark.parametrize("kind", ["exchanged", "rotated"])
 def test_the_axes_of_one_plate_in_a_run(run, plate, kind):
     found = [*force_directions(context_of(misread(run, plate, kind)))]
-    assert [(one.code, one.evidence["plate"].value) for one in found] == [("P236", run.plates.names[plate])]
+    assert [(reported.code, reported.evidence["plate"].value) for reported in found] == [
+        ("P236", run.plates.names[plate])
+    ]
 
 
 @pytest.mark.parametrize("plate", [0, 1])
@@ -89,7 +91,9 @@ def test_the_axes_of_one_plate(walk, plate, kind):
         apart = context.velocity_changes.by_forces - context.velocity_changes.centre
         assert np.linalg.norm(apart[:, [0, 2]].std(axis=0)) < 0.1
         return
-    assert [(one.code, one.evidence["plate"].value) for one in found] == [("P236", walk.plates.names[plate])]
+    assert [(reported.code, reported.evidence["plate"].value) for reported in found] == [
+        ("P236", walk.plates.names[plate])
+    ]
     before, after = found[0].evidence["velocity_residual_m_s"].value
     assert after < 0.8 * before
 
@@ -100,7 +104,7 @@ def test_both_signs_of_one_plate(walk, plate):
     signs = np.ones((2, 3))
     signs[plate, [0, 2]] = -1.0
     found = [*force_directions(context_of(with_force(walk, lambda force: force * signs)))]
-    assert [(one.code, one.where.plate) for one in found] == [("P233", walk.plates.names[plate])] * 2
+    assert [(reported.code, reported.where.plate) for reported in found] == [("P233", walk.plates.names[plate])] * 2
 
 
 @pytest.mark.parametrize(
@@ -114,7 +118,11 @@ def test_a_wrong_zero_is_not_called_a_wrong_sign(walk, newton, plates, axis):
     zero = np.zeros((2, 3))
     zero[plates, axis] = newton
     wrong = context_of(with_force(walk, lambda force: force + zero * (force[..., 1:2] > 0.0)))
-    along = [one for one in loaded(wrong.recording) if one.where.axis == wrong.along(axis)["axis"] and one.is_open]
+    along = [
+        reported
+        for reported in loaded(wrong.recording)
+        if reported.where.axis == wrong.along(axis)["axis"] and reported.is_open
+    ]
     assert len(along) == 1
     assert along[0].code in ("P212", "P214", "P222", "P233")
     if along[0].code in ("P222", "P233"):
@@ -132,7 +140,7 @@ def test_signs_over_two_windows(walk):
     (start, end), *_ = trial.windows()
     cut = np.abs(trial.markers.time - (start + 0.45 * (end - start))) < 1.5 / trial.markers.rate_hz
     parted = replace(trial, measured=trial.measured & ~cut)
-    assert len([one for one in parted.windows() if one[1] <= end]) == 2
+    assert len([window for window in parted.windows() if window[1] <= end]) == 2
     context.__dict__["velocities"] = force_velocities(parted, context.segment_of_label)
     assert [*force_directions(context)] == []
 
@@ -204,16 +212,16 @@ def test_forces_with_another_axis_up(walk):
     plates = walk.plates
     up = replace(walk, plates=replace(plates, force=plates.force @ turn.T, moment=plates.moment @ turn.T))
     context = context_of(up)
-    (found,) = [one for one in found_in(context) if one.is_open]
+    (found,) = [reported for reported in found_in(context) if reported.is_open]
     assert (found.code, found.where) == ("P201", context.at(**context.along(2)))
     assert found.evidence["peak_n"].value[2] == np.abs(plates.force[..., 1]).max()
 
 
 def test_torques_in_newton_millimetres(walk):
     wrong = found_in(context_of(with_force(walk, lambda force: force, torque=1000.0)))
-    found = [one for one in wrong if one.code == "P203"]
-    assert {one.where.plate for one in found} == set(walk.plates.names)
-    assert min(one.evidence["lever_arm_m"].value for one in found) > 0.15
+    found = [reported for reported in wrong if reported.code == "P203"]
+    assert {reported.where.plate for reported in found} == set(walk.plates.names)
+    assert min(reported.evidence["lever_arm_m"].value for reported in found) > 0.15
 
 
 @pytest.mark.parametrize("name", SQUATS)

@@ -26,8 +26,8 @@ def late_by(person, *delay_s):
 def delays_of(findings):
     """Delays (s) by the names of the trials."""
     found = list(findings)
-    assert all(one.code == "T213" for one in found)
-    return {one.where.trial: one.evidence["delay_s"].value for one in found}
+    assert all(finding.code == "T213" for finding in found)
+    return {finding.where.trial: finding.evidence["delay_s"].value for finding in found}
 
 
 def test_trials_that_share_a_time_base(person):

@@ -15,7 +15,8 @@ from kinertia.trial.file_contents import FileEvent
 from kinertia.trial.stances import load_edges
 
 FOOT_MARKERS = {
-    side: [one.label for one in walking_subject().skeleton.markers if one.segment == f"foot_{side}"] for side in FEET
+    side: [marker.label for marker in walking_subject().skeleton.markers if marker.segment == f"foot_{side}"]
+    for side in FEET
 }
 
 
@@ -46,16 +47,16 @@ def test_events_with_their_forces(trial):
 def test_one_event_that_is_off(trial, delay_s, words):
     events = of_loads(trial)
     events[3] = FileEvent(events[3].time_s + delay_s, events[3].side, "Foot Off", "", events[3].kind)
-    (one,) = found(trial, events)
-    assert one.code == "T311"
-    assert one.evidence["difference_s"].value == pytest.approx(delay_s)
-    assert one.evidence["events"].value == 1
-    assert words in one.message
+    (finding,) = found(trial, events)
+    assert finding.code == "T311"
+    assert finding.evidence["difference_s"].value == pytest.approx(delay_s)
+    assert finding.evidence["events"].value == 1
+    assert words in finding.message
 
 
 def test_events_of_the_other_foot(trial):
-    (one,) = found(trial, of_loads(trial, sides=("l", "r")))
-    assert one.code == "T312"
+    (finding,) = found(trial, of_loads(trial, sides=("l", "r")))
+    assert finding.code == "T312"
 
 
 @pytest.mark.parametrize("sides", [FEET, ("l", "r")])
@@ -66,9 +67,9 @@ def test_times_that_count_from_the_first_frame_of_a_cropped_file(trial, sides):
     first_s = float(trial.markers.time[cut][0])
     markers = replace(trial.markers, time=trial.markers.time[cut], positions=trial.markers.positions[cut])
     cropped = replace(trial, markers=markers, measured=trial.measured[cut])
-    codes = [one.code for one in found(cropped, of_loads(trial, -first_s, sides))]
+    codes = [finding.code for finding in found(cropped, of_loads(trial, -first_s, sides))]
     assert codes == (["T314"] if sides == FEET else [])
-    assert [one.code for one in found(cropped, of_loads(trial))] == []
+    assert [finding.code for finding in found(cropped, of_loads(trial))] == []
 
 
 def unloaded(trial):
@@ -83,10 +84,10 @@ def test_one_event_of_the_other_foot(trial, on_plates):
     measured = trial if on_plates else unloaded(trial)
     assert found(measured, events, feet) == []
     events[3] = replace(events[3], side="l" if events[3].side == "r" else "r")
-    (one,) = found(measured, events, feet)
-    assert one.code == "T313"
-    assert one.evidence["time_s"].value == events[3].time_s
-    assert one.evidence["other_foot"].value != one.evidence["foot"].value
+    (finding,) = found(measured, events, feet)
+    assert finding.code == "T313"
+    assert finding.evidence["time_s"].value == events[3].time_s
+    assert finding.evidence["other_foot"].value != finding.evidence["foot"].value
 
 
 def test_general_events_are_nobody_s_step(trial):

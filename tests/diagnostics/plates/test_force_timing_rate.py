@@ -45,10 +45,10 @@ def test_forces_at_their_rate(walk, delay_s, gain):
 @pytest.mark.parametrize("name", [name for name in RATES if name in SOUND])
 def test_forces_at_another_rate(recording_of, name):
     for rate in RATES[name]:
-        (one,) = found(recording_of(*SOUND[name]), rate)
-        assert (one.code, one.severity) == ("T201", Severity.WARNING)
-        assert one.evidence["ratio"].value == pytest.approx(rate, abs=0.011)
-        begin, end = one.evidence["delay_s"].value
+        (finding,) = found(recording_of(*SOUND[name]), rate)
+        assert (finding.code, finding.severity) == ("T201", Severity.WARNING)
+        assert finding.evidence["ratio"].value == pytest.approx(rate, abs=0.011)
+        begin, end = finding.evidence["delay_s"].value
         assert (end > begin) == (rate > 1)
 
 
@@ -78,5 +78,5 @@ def test_a_file_at_another_rate(recording_of, name, factor):
 
     markers, plates = walk.markers, replace(walk.plates, time=stretched(walk.plates.time))
     slow = replace(walk, markers=Markers(stretched(markers.time), markers.labels, markers.positions), plates=plates)
-    (one,) = [one for one in force_rate(context_of(slow)) if one.code == "T202"]
-    assert one.evidence["rate_factor"].value == pytest.approx(1 / factor, rel=0.2)
+    (finding,) = [finding for finding in force_rate(context_of(slow)) if finding.code == "T202"]
+    assert finding.evidence["rate_factor"].value == pytest.approx(1 / factor, rel=0.2)

@@ -41,8 +41,10 @@ def test_the_sign_of_one_axis_of_one_step(walk):
         signs[axis] = -1.0
         context = of_one_foot(walk, np.diag(signs))
         found[axis] = [*force_directions(context)]
-        assert all((one.code, one.where) == ("P232", context.at(**context.along(axis))) for one in found[axis])
-        assert all(one.evidence["correlation"].value < -0.3 for one in found[axis])
+        assert all(
+            (finding.code, finding.where) == ("P232", context.at(**context.along(axis))) for finding in found[axis]
+        )
+        assert all(finding.evidence["correlation"].value < -0.3 for finding in found[axis])
     assert any(found.values())
 
 

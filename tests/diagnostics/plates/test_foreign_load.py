@@ -61,8 +61,8 @@ def test_another_person_on_a_plate(recording_of, share):
     assert not left[(time > span_s[0]) & (time < span_s[1])].any()
     assert context.force_mass.mass_kg == pytest.approx(72.6, abs=4.0)
     assert spoilt.plates.names[0] not in context.whole_plate_masses
-    others = [one for one in explained([found, *gains(context)]) if one.muted_by is None]
-    assert [one.code for one in others] == ["P284"]
+    others = [reported for reported in explained([found, *gains(context)]) if reported.muted_by is None]
+    assert [finding.code for finding in others] == ["P284"]
 
 
 def test_where_nothing_else_is_left_the_trial_is_blocked(recording_of):

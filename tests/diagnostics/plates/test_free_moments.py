@@ -111,8 +111,8 @@ def test_neither_axes_nor_floor_nor_the_place_of_the_body_matter():
 def test_silent_without_whole_strides_or_a_foot():
     loads, body, _ = gait((3.0, 8.0))
     assert moment_of(loads, body, 0.9, 1.7) is None
-    one = replace(loads, force=loads.force * [[[1], [0]]], moment=loads.moment * [[[1], [0]]])
-    assert moment_of(one, body) is None
+    unloaded = replace(loads, force=loads.force * [[[1], [0]]], moment=loads.moment * [[[1], [0]]])
+    assert moment_of(unloaded, body) is None
 
 
 @pytest.fixture(scope="module")
@@ -182,7 +182,7 @@ def test_whole_trials(file_of, recording_of, name):
     """Many do not hold a whole stride."""
     forces, contradicts = TRIALS[name]
     recording = recording_of(name, forces)
-    own = None
+    body = None
     if "subject4" in name:
-        own = markers_of_model(read_osim(file_of("subject4/addbiomechanics_scaled.osim")))
-    assert bool(found(recording, own)) == contradicts
+        body = markers_of_model(read_osim(file_of("subject4/addbiomechanics_scaled.osim")))
+    assert bool(found(recording, body)) == contradicts

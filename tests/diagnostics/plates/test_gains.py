@@ -53,10 +53,10 @@ def test_a_light_plate_that_a_foot_reaches_beyond_is_not_accused(recording_of):
     factors = np.array([1.0, 0.8])[:, None]
     light = replace(walk.plates, force=walk.plates.force * factors, moment=walk.plates.moment * factors)
     context = context_of(replace(walk, plates=light))
-    assert [one.code for one in gains(context)] == ["P221"]
+    assert [finding.code for finding in gains(context)] == ["P221"]
     for plate, found in ((0, ["P221"]), (1, [])):
         context.__dict__["overhangs"] = [Overhang(plate, plate, 0.15, (0.5, 1.0), (0.5, 1.0))]
-        assert [one.code for one in gains(context)] == found
+        assert [finding.code for finding in gains(context)] == found
 
 
 @pytest.mark.parametrize("gain", [0.96, 1.05])
@@ -84,7 +84,7 @@ def test_a_crutch_beside_one_foot_looks_like_a_light_plate(walk, foot):
     point = centre_of_pressure(plates.wrench)
     moment = plates.moment - np.cross(point, support)
     context = context_of(replace(walk, plates=replace(plates, force=plates.force - support, moment=moment)))
-    found = [(one.code, one.evidence["other"].value) for one in gains(context)]
+    found = [(finding.code, finding.evidence["other"].value) for finding in gains(context)]
     assert found == ([] if light_beyond(context) else [("P221", plates.names[foot])])
 
 
@@ -123,4 +123,4 @@ def test_zeros_of_both_plates_are_no_gain_of_one(recording_of, plate):
     walk = recording_of(*LONG_WALKS["synthetic"])
     zeros_n = np.array([[-16.0, 0.0, 0.0], [-9.0, 0.0, 0.0]])[:: 1 - 2 * plate]
     wrong = with_force(walk, lambda force: force + zeros_n * (force[..., 1:2] > 20.0))
-    assert [one for one in gains(context_of(wrong)) if one.code == "P222"] == []
+    assert [finding for finding in gains(context_of(wrong)) if finding.code == "P222"] == []

@@ -52,9 +52,9 @@ def test_a_heel_behind_its_plate():
     assert (found.code, found.severity, found.where.plate) == ("P282", Severity.WARNING, "plate 1")
     assert found.evidence["overhang_m"].value == pytest.approx(0.06, abs=0.002)
     assert found.evidence["foot"].value == "right"
-    (one,) = context.overhangs
-    assert one.span_s == one.unmeasured_s == found.where.span_s
-    span = one.span_s
+    (overhang,) = context.overhangs
+    assert overhang.span_s == overhang.unmeasured_s == found.where.span_s
+    span = overhang.span_s
     assert 0.15 <= span[0] < span[1] <= 0.85, "the markers of that foot are slow so long"
 
 
@@ -74,15 +74,15 @@ def test_a_foot_that_lands_or_leaves_beside_its_plate(lost_s, lands_or_leaves_s)
         moment=np.where(lost[:, None, None], 0.0, recording.plates.moment),
     )
     context = replace(context_of(replace(recording, plates=plates), FEET), marker_set=marker_set())
-    (one,) = context.overhangs
-    assert one.unmeasured_s[0] <= lands_or_leaves_s <= one.unmeasured_s[1]
+    (overhang,) = context.overhangs
+    assert overhang.unmeasured_s[0] <= lands_or_leaves_s <= overhang.unmeasured_s[1]
     measured = context.trial_on_plates.measured
     there = np.abs(context.recording.markers.time - lands_or_leaves_s) < 0.01
     assert not measured[there].any()
     legs, before = context.trial_on_plates.known_legs, context.trial.known_legs
-    assert not legs[there, one.foot].any()
-    np.testing.assert_array_equal(legs[:, 1 - one.foot], before[:, 1 - one.foot])
-    assert one.plate not in {whole.plate for whole in context.whole_contacts}
+    assert not legs[there, overhang.foot].any()
+    np.testing.assert_array_equal(legs[:, 1 - overhang.foot], before[:, 1 - overhang.foot])
+    assert overhang.plate not in {whole.plate for whole in context.whole_contacts}
 
 
 def test_a_heel_is_on_the_ground_where_it_is_low_under_load():
@@ -94,8 +94,8 @@ def test_a_heel_is_on_the_ground_where_it_is_low_under_load():
     positions = recording.markers.positions.copy()
     positions[(time > 0.2) & (time < 0.28), 0, 1] -= 0.04
     landing = replace(recording, plates=plates, markers=replace(recording.markers, positions=positions))
-    (one,) = context_of(landing, FEET).overhangs
-    assert one.unmeasured_s[1] == pytest.approx(0.8, abs=0.05)
+    (overhang,) = context_of(landing, FEET).overhangs
+    assert overhang.unmeasured_s[1] == pytest.approx(0.8, abs=0.05)
 
 
 def test_a_foot_that_is_never_seen_under_load_is_over_no_edge():
@@ -120,11 +120,11 @@ def test_a_centre_of_pressure_nearer_to_an_edge_than_a_whole_foot(inside_m, foun
     corners = recording.plates.corners.copy()
     corners[0, :, 2] += np.ptp(corners[0, :, 2]) / 2 - inside_m
     context = context_of(replace(recording, plates=replace(recording.plates, corners=corners)), FEET)
-    assert [one.code for one in plate_edges(context)] == found
+    assert [finding.code for finding in plate_edges(context)] == found
     if found:
-        (one,) = context.overhangs
-        assert one.overhang_m == pytest.approx(0.035 - inside_m, abs=0.002)
-        assert one.unmeasured_s == one.span_s == (pytest.approx(0.2, abs=0.05), pytest.approx(0.8, abs=0.05))
+        (overhang,) = context.overhangs
+        assert overhang.overhang_m == pytest.approx(0.035 - inside_m, abs=0.002)
+        assert overhang.unmeasured_s == overhang.span_s == (pytest.approx(0.2, abs=0.05), pytest.approx(0.8, abs=0.05))
 
 
 def lifting_heels(recording, rise_s=0.15):
@@ -140,10 +140,10 @@ def test_a_toe_bears_load_once_the_heel_is_lifted(toes):
     """In front of its plate by 40 mm; the ball of a foot does all the time."""
     context = replace(context_of(lifting_heels(on_plates(-0.2 - 0.24)), FEET), marker_set=marker_set(toes))
     (found,) = plate_edges(context)
-    (one,) = context.overhangs
+    (overhang,) = context.overhangs
     assert found.evidence["overhang_m"].value == pytest.approx(0.04, abs=0.002)
-    begins = 0.2 + 0.6 - 0.15 * 5 / 6 if toes else one.span_s[0]
-    assert one.unmeasured_s == (pytest.approx(begins, abs=0.02), pytest.approx(0.8, abs=0.05))
+    begins = 0.2 + 0.6 - 0.15 * 5 / 6 if toes else overhang.span_s[0]
+    assert overhang.unmeasured_s == (pytest.approx(begins, abs=0.02), pytest.approx(0.8, abs=0.05))
     time, measured = context.recording.markers.time, context.trial.measured
     lost = measured & ~context.trial_on_plates.measured
     assert time[lost].min() == pytest.approx(max(begins, time[measured].min()), abs=0.02)
@@ -187,7 +187,7 @@ def test_what_counts_beside_the_plate_is_load_not_time(light_n, found):
     force[early, 0, 1] = light_n
     moment[early, 0] = np.cross(plates.corners[0].max(axis=0) + np.array([0.05, 0.0, 0.0]), force[early, 0])
     light = replace(recording, plates=replace(plates, force=force, moment=moment))
-    assert [one.code for one in cop_on_plate(context_of(light, FEET))] == found
+    assert [finding.code for finding in cop_on_plate(context_of(light, FEET))] == found
 
 
 def test_no_forces_and_one_frame():
@@ -197,7 +197,7 @@ def test_no_forces_and_one_frame():
         (replace(recording, plates=None), "P271"),
         (replace(recording, markers=recording.markers.cut(0.5, 0.5)), "T104"),
     ):
-        (found,) = [one for one in place_findings(wrong, FEET) if one.severity is Severity.ERROR]
+        (found,) = [finding for finding in place_findings(wrong, FEET) if finding.severity is Severity.ERROR]
         assert found.code == code
         assert doubted(wrong, FEET, is_static=True) == []
 
@@ -216,7 +216,11 @@ def of_field(recording, feet, **landmarks):
 
 
 def errors_and_warnings(context):
-    return [one.code for one in place_findings(context.recording, context=context) if one.severity > Severity.CORRECTED]
+    return [
+        finding.code
+        for finding in place_findings(context.recording, context=context)
+        if finding.severity > Severity.CORRECTED
+    ]
 
 
 @pytest.mark.parametrize("name", here(["field/lasem/walk01.c3d"]))
@@ -250,10 +254,14 @@ BESIDE = {
 
 @pytest.mark.parametrize("name", here(BESIDE))
 def test_feet_of_other_laboratories(recording_of, name):
-    found = [one for one in place_findings(recording_of(name)) if one.code == "P282"]
+    found = [finding for finding in place_findings(recording_of(name)) if finding.code == "P282"]
     expected = BESIDE[name]
-    assert [(one.where.plate, one.evidence["foot"].value) for one in found] == [one[:2] for one in expected]
-    assert [one.evidence["overhang_m"].value for one in found] == pytest.approx([one[2] for one in expected], abs=0.01)
+    assert [(finding.where.plate, finding.evidence["foot"].value) for finding in found] == [
+        wanted[:2] for wanted in expected
+    ]
+    assert [finding.evidence["overhang_m"].value for finding in found] == pytest.approx(
+        [wanted[2] for wanted in expected], abs=0.01
+    )
 
 
 @pytest.mark.parametrize("name", here([f"field/opensim_core/{name}.c3d" for name in ("walking2", "test_walking")]))
@@ -261,7 +269,7 @@ def test_a_heel_that_lands_before_the_plate_is_no_other_trial(recording_of, name
     recording = recording_of(name)
     context = of_field(recording, ["CAL", "MT1", "MT2"], heel="CAL", metatarsal="MT2")
     assert set(errors_and_warnings(context)) == {"P282"}
-    assert max(one.overhang_m for one in context.overhangs) > 0.12
+    assert max(overhang.overhang_m for overhang in context.overhangs) > 0.12
     # with the heel alone nobody knows when a foot leaves the ground
     heel = of_field(recording, ["CAL"], heel="CAL", metatarsal="MT5")
     assert not set(errors_and_warnings(heel)) & {"T211", "T212", "T201", "P243", "P244"}
@@ -280,19 +288,24 @@ def test_single_legs_are_known_where_contact_is_never_complete():
     """P290, a WARNING; without enough frames of a leg P279."""
     slow = walk([("r", 0)], stance_s=0.95)
     found = list(complete_contact(context_of(replace(slow, markers=slow.markers.cut(0.25, 0.60)), FEET)))
-    (one,) = [each for each in found if each.code == "P290"]
-    assert (one.severity.name, one.evidence["foot"].value, one.evidence["frames"].value) == ("WARNING", "right", 36)
+    (finding,) = [reported for reported in found if reported.code == "P290"]
+    assert (finding.severity.name, finding.evidence["foot"].value, finding.evidence["frames"].value) == (
+        "WARNING",
+        "right",
+        36,
+    )
     few = list(complete_contact(context_of(replace(slow, markers=slow.markers.cut(0.25, 0.33)), FEET)))
-    assert [each.code for each in few] == ["P279"]
+    assert [reported.code for reported in few] == ["P279"]
 
 
 def found(*recordings: Recording):
     """Code, severity, side and phase of what is found in walks."""
-    contexts = [context_of(one, FEET) for one in recordings]
+    contexts = [context_of(recording, FEET) for recording in recordings]
     rows = list(stance_coverage(replace(person(), trials=contexts)))
-    phases = [one.evidence["phase"].value if "phase" in one.evidence else "" for one in rows]
+    phases = [finding.evidence["phase"].value if "phase" in finding.evidence else "" for finding in rows]
     return [
-        (one.code, one.severity, one.evidence["side"].value, phase) for one, phase in zip(rows, phases, strict=True)
+        (finding.code, finding.severity, finding.evidence["side"].value, phase)
+        for finding, phase in zip(rows, phases, strict=True)
     ]
 
 

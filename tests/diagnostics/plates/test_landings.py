@@ -34,7 +34,7 @@ LABORATORY = MarkerSet(
     {
         "pelvis": ("RASI", "LASI", "SACR"),
         "torso": ("C7", "RSH", "LSH"),
-        **{f"{part}_{s}": tuple(s.upper() + one for one in own) for part, own in SIDES.items() for s in "rl"},
+        **{f"{part}_{s}": tuple(s.upper() + label for label in labels) for part, labels in SIDES.items() for s in "rl"},
     },
     {},
 )
@@ -48,7 +48,7 @@ def test_drop_landings_of_another_laboratory(recording_of, name):
     context = RecordingContext(recording_of(name), LABORATORY)
     assert not context.has_strides
     found = asked((*PLACE_CHECKS, *LOADED_CHECKS), context)
-    assert [one.code for one in found if one.severity > Severity.CORRECTED] == []
+    assert [finding.code for finding in found if finding.severity > Severity.CORRECTED] == []
     assert context.velocities[0].mass_kg == pytest.approx(58.8, rel=0.08)
 
 

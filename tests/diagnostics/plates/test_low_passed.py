@@ -62,12 +62,12 @@ def test_forces_low_passed_too_strongly(recording_of, name, cutoff_hz):
     if cutoff_hz > 10.0 and name not in ("gait2354", "rajagopal"):
         assert found == []
     if cutoff_hz < 10.0:
-        assert [(one.code, one.severity) for one in found] == [("P108", Severity.WARNING)]
+        assert [(finding.code, finding.severity) for finding in found] == [("P108", Severity.WARNING)]
         assert 3.0 < found[0].evidence["cutoff_hz"].value < found[0].evidence["cutoff_hz"].limit
 
 
 @pytest.mark.parametrize("name", FILTERED)
 def test_a_filter_that_unloaded_plates_show(recording_of, name):
     """From 57 to 18 ms before the load begins, the plates read 12 N less than nothing: 12.4 Hz forth and back."""
-    (one,) = low_passed(plates_alone(recording_of(*FILTERED[name]).plates))
-    assert one.evidence["cutoff_hz"].value == pytest.approx(9.9, rel=0.1)
+    (finding,) = low_passed(plates_alone(recording_of(*FILTERED[name]).plates))
+    assert finding.evidence["cutoff_hz"].value == pytest.approx(9.9, rel=0.1)

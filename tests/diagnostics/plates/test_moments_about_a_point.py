@@ -31,7 +31,7 @@ ASIDE_M = dict.fromkeys(("synthetic", "synthetic c3d", "run, synthetic"), 0.15)
 
 def moved_points(plates):
     """P261 by a fixed point: files may have no free moments, which is another finding."""
-    return [one for one in free_moments(plates_alone(replace(plates, torques=None))) if one.code == "P261"]
+    return [finding for finding in free_moments(plates_alone(replace(plates, torques=None))) if finding.code == "P261"]
 
 
 @pytest.mark.parametrize("name", [*WALKS, *OTHERS])
@@ -53,10 +53,10 @@ def test_moments_about_the_middle(name, recording_of):
         extra = np.cross(point[:, p] - middle, plates.force[:, p])[:, 1]
         moment[:, p, 1] += np.where(loaded[:, p], extra, 0.0)
     found = moved_points(replace(plates, moment=moment))
-    assert {one.where.plate for one in found} <= set(middles)
+    assert {finding.where.plate for finding in found} <= set(middles)
     assert found
-    for one in found:
-        assert one.evidence["left_rms_nm"].value < one.evidence["left_rms_nm"].limit
+    for finding in found:
+        assert finding.evidence["left_rms_nm"].value < finding.evidence["left_rms_nm"].limit
 
 
 def test_moments_of_one_export_are_about_points_alike(recording_of):
@@ -68,7 +68,7 @@ def test_moments_of_one_export_are_about_points_alike(recording_of):
         loaded = plates.force[:, p, 1] > FIRM_LOAD_N
         moment[:, p, 1] += np.where(loaded, np.cross([0.0, 0.0, aside_m], plates.force[:, p])[:, 1], 0.0)
     both = moved_points(replace(plates, moment=moment))
-    assert [one.where.plate for one in both] == list(plates.names)
+    assert [finding.where.plate for finding in both] == list(plates.names)
     alone = moment.copy()
     alone[:, 0] = plates.moment[:, 0]
     assert moved_points(replace(plates, moment=alone)) == []

@@ -27,10 +27,10 @@ def early():
 
 def test_it_is_no_other_rate(early):
     context = context_of(early, FEET)
-    (contact,) = [one for one in context.contacts if one.plate == 0]
+    (contact,) = [load for load in context.contacts if load.plate == 0]
     span_s = (float(contact.time[0]), float(contact.time[-1]))
     context.__dict__["overhangs"] = [Overhang(0, 0, 0.15, span_s, span_s)]
-    assert {one.plate for one in context.whole_contacts} == {1}
+    assert {whole_contact.plate for whole_contact in context.whole_contacts} == {1}
     assert (context.whole_loads.force[:, 0] == 0.0).all()
     assert (context.whole_loads.force[:, 1] == early.plates.force[:, 1]).all()
     assert list(fitted_rate_or_delay(context)) == []
@@ -52,7 +52,7 @@ def test_it_is_no_other_rate_of_both(recording_of, files):
     factor = np.where(partly, np.maximum(weight + 4.0 * (total - weight), 20.0) / np.maximum(total, 50.0), 1.0)
     factor = factor[:, None, None]
     spoilt = replace(recording, plates=replace(plates, force=factor * plates.force, moment=factor * plates.moment))
-    assert [one.code for one in force_rate(context_of(spoilt))] == ["T202"]
+    assert [finding.code for finding in force_rate(context_of(spoilt))] == ["T202"]
     context = context_of(spoilt)
     context.__dict__["overhangs"] = [Overhang(1, 0, 0.06, span_s, span_s)]
     assert list(force_rate(context)) == []

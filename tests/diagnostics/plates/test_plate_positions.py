@@ -90,7 +90,7 @@ def test_the_remedy_is_that_of_the_forces(recording_of, name):
     moment = about + (plates.moment - about) * [-1.0, 1.0, -1.0]
     channels = error_of(replace(recording, plates=replace(plates, moment=moment)), feet_of(recording))
     assert (channels.code, channels.evidence["operation"].value) == ("P242", "rotated by 180 degrees")
-    assert all(one in channels.remedy for one in ("Fz1 with Fz3", "Fx12 with Fx34", "Fy14 with Fy23"))
+    assert all(channel in channels.remedy for channel in ("Fz1 with Fz3", "Fx12 with Fx34", "Fy14 with Fy23"))
     assert channels.causes != turned.causes
 
 
@@ -130,26 +130,26 @@ def test_two_belts_are_two_plates():
 def test_a_copy_is_found_whichever_its_place(noise_n):
     rng = np.random.default_rng(1)
     copy = RIGHT + rng.normal(scale=noise_n, size=RIGHT.shape)
-    (one,) = found([RIGHT, LEFT, copy], [*PLACES, [3.0, 0.0, 0.0]])
-    assert (one.code, one.where.plate) == ("P287", "plate 3")
-    assert one.evidence["others"].value == "plate 1"
-    assert one.evidence["names"].value == '"plate 1", "plate 2"'
+    (finding,) = found([RIGHT, LEFT, copy], [*PLACES, [3.0, 0.0, 0.0]])
+    assert (finding.code, finding.where.plate) == ("P287", "plate 3")
+    assert finding.evidence["others"].value == "plate 1"
+    assert finding.evidence["names"].value == '"plate 1", "plate 2"'
 
 
 def test_the_sum_of_two_is_found_before_and_after_them():
     for order, whole in (([RIGHT + LEFT, RIGHT, LEFT], "plate 1"), ([RIGHT, LEFT, RIGHT + LEFT], "plate 3")):
-        (one,) = found(order)
-        assert one.where.plate == whole
+        (finding,) = found(order)
+        assert finding.where.plate == whole
 
 
 def test_a_copy_with_another_gain_is_found_at_the_same_place_only():
-    assert [one.where.plate for one in found([RIGHT, LEFT, 0.8 * RIGHT], [*PLACES, PLACES[0]])] == ["plate 3"]
+    assert [finding.where.plate for finding in found([RIGHT, LEFT, 0.8 * RIGHT], [*PLACES, PLACES[0]])] == ["plate 3"]
     assert found([RIGHT, LEFT, 0.8 * RIGHT], [*PLACES, [3.0, 0.0, 0.0]]) == []
 
 
 def test_two_belts_in_a_file_as_eight_plates_leave_two():
     forces = [RIGHT, LEFT, RIGHT, LEFT, RIGHT + LEFT, RIGHT, LEFT, RIGHT + LEFT]
-    assert sorted(one.where.plate for one in found(forces)) == [f"plate {k}" for k in range(3, 9)]
+    assert sorted(finding.where.plate for finding in found(forces)) == [f"plate {k}" for k in range(3, 9)]
 
 
 def test_both_feet_in_a_squat_are_two_plates():
@@ -170,8 +170,8 @@ def test_selected_plates_keep_what_is_theirs():
         TIME, ("a", "b", "c"), force, 2 * force, ("r", None, "l"), np.array([SQUARE, SQUARE + 1.0, SQUARE + 2.0]),
         noise_n=(0.1, 0.2, 0.3),
     )  # fmt: skip
-    own = selected(plates, ["c", "a"])
-    assert (own.names, own.declared_feet, own.noise_n) == (("a", "c"), ("r", "l"), (0.1, 0.3))
-    assert np.array_equal(own.force, force[:, [0, 2]])
-    assert np.array_equal(own.moment, 2 * force[:, [0, 2]])
-    assert np.array_equal(own.corners, replace(plates).corners[[0, 2]])
+    chosen = selected(plates, ["c", "a"])
+    assert (chosen.names, chosen.declared_feet, chosen.noise_n) == (("a", "c"), ("r", "l"), (0.1, 0.3))
+    assert np.array_equal(chosen.force, force[:, [0, 2]])
+    assert np.array_equal(chosen.moment, 2 * force[:, [0, 2]])
+    assert np.array_equal(chosen.corners, replace(plates).corners[[0, 2]])

@@ -29,11 +29,11 @@ def test_corners_above_the_soles(recording_of, name):
     recording = recording_of(name)
     raised = replace(recording.plates, corners=recording.plates.corners + np.array([0.0, RAISED_M, 0.0]))
     found = found_in(replace(recording, plates=raised))
-    assert {one.code for one in found} == {"P249"}
-    assert {one.where.plate for one in found} == set(raised.names)
-    for one in found:
-        assert one.evidence["surface_m"].value == pytest.approx(RAISED_M)
-        assert 0.0 < one.evidence["depth_m"].value < RAISED_M
+    assert {finding.code for finding in found} == {"P249"}
+    assert {finding.where.plate for finding in found} == set(raised.names)
+    for finding in found:
+        assert finding.evidence["surface_m"].value == pytest.approx(RAISED_M)
+        assert 0.0 < finding.evidence["depth_m"].value < RAISED_M
 
 
 @pytest.mark.parametrize(
@@ -48,4 +48,4 @@ def test_centres_of_pressure_above_the_soles(file_of, tmp_path, name):
     recording = read_recording(file_of(f"{name}.trc"), tmp_path / "grf.mot")
     raised = read_forces(tmp_path / "grf.mot")[0].torques[0].height_m
     assert raised - as_it_is.torques[0].height_m == pytest.approx(RAISED_M)
-    assert {one.code for one in found_in(recording)} == {"P249"}
+    assert {finding.code for finding in found_in(recording)} == {"P249"}

@@ -30,8 +30,8 @@ def plates(noise_n=1.0, force=None):
     force = force + np.random.default_rng(1).normal(0.0, noise_n, force.shape)
     point = np.column_stack([1.0 + 0.3 * (TIME - 0.6), np.zeros_like(TIME), 0.4 + 0.05 * np.sin(TIME)])
     load = without_unloaded_level(TIME, force, np.cross(point, force))
-    each = (load.force[:, None], load.moment[:, None])
-    return PlateLoads(TIME, ("plate 1",), *each, declared_feet=(None,), unloaded=(load.unloaded,))
+    loads = (load.force[:, None], load.moment[:, None])
+    return PlateLoads(TIME, ("plate 1",), *loads, declared_feet=(None,), unloaded=(load.unloaded,))
 
 
 def low_passed(force, cutoff_hz, order=2):
@@ -40,11 +40,17 @@ def low_passed(force, cutoff_hz, order=2):
 
 def found(plates):
     """P105 and P106, with their headlines."""
-    return [(one.code, next(iter(one.evidence.values())).value) for one in quantisation(plates_alone(plates))]
+    return [
+        (finding.code, next(iter(finding.evidence.values())).value) for finding in quantisation(plates_alone(plates))
+    ]
 
 
 def cut(plates):
-    return [(one.code, one.evidence["level_n"].value) for one in signals(plates_alone(plates)) if one.code == "P104"]
+    return [
+        (finding.code, finding.evidence["level_n"].value)
+        for finding in signals(plates_alone(plates))
+        if finding.code == "P104"
+    ]
 
 
 @pytest.mark.parametrize("noise_n", [0.0, 1.0, 3.0])

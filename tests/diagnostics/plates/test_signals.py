@@ -26,8 +26,8 @@ def plates(offset=(0.0, 0.0, 0.0), drift_n=0.0, factor=1.0, weight_n=700.0, zero
     force, moment, spikes = without_spikes(TIME, force, np.zeros_like(force))
     load = without_unloaded_level(TIME, force, moment)
     twist = np.outer(0.01 * load.force[:, 1], [0.0, 1.0, 0.0])
-    each = (load.force[:, None], (load.moment + twist)[:, None])
-    read = PlateLoads(TIME, ("plate 1",), *each, declared_feet=(None,), unloaded=(load.unloaded,), spikes=(spikes,))
+    loads = (load.force[:, None], (load.moment + twist)[:, None])
+    read = PlateLoads(TIME, ("plate 1",), *loads, declared_feet=(None,), unloaded=(load.unloaded,), spikes=(spikes,))
     return with_unloaded_levels(read) if zeroed else read
 
 
@@ -36,8 +36,8 @@ def found(plates, **stated):
 
 
 def only(plates, **stated):
-    (one,) = found(plates, **stated)
-    return one
+    (finding,) = found(plates, **stated)
+    return finding
 
 
 def test_a_fault_free_plate():
@@ -67,10 +67,10 @@ def test_all_zeros_that_are_wrong_are_found():
     """D22: of every axis."""
     assert only(plates(offset=(30.0, 60.0, -30.0))).evidence["levels_n"].value == pytest.approx((30, 60, -30), abs=0.5)
     zeros = found(plates(offset=(30.0, 60.0, -30.0), zeroed=True))
-    assert [(one.code, one.where.axis) for one in zeros] == [
+    assert [(finding.code, finding.where.axis) for finding in zeros] == [
         ("P213", axis) for axis in ("fore-aft", "vertical", "mediolateral")
     ]
-    assert [one.severity for one in zeros] == [Severity.WARNING, Severity.ERROR, Severity.WARNING]
+    assert [zero.severity for zero in zeros] == [Severity.WARNING, Severity.ERROR, Severity.WARNING]
 
 
 @pytest.mark.parametrize("level_n", [30.0, 50.0, 100.0])
@@ -98,8 +98,8 @@ def test_feet_that_stay_in_kilonewtons():
     vertical = 0.35 + 0.06 * np.sin(2 * np.pi * TIME)
     noise = np.random.default_rng(100).normal(0.0, 0.001, (len(TIME), 3))
     load = without_unloaded_level(TIME, np.outer(vertical, [0.0, 1.0, 0.0]) + noise, np.zeros((len(TIME), 3)))
-    each = (load.force[:, None], load.moment[:, None])
-    assert only(PlateLoads(TIME, ("plate 1",), *each, declared_feet=(None,), unloaded=(load.unloaded,))).code == "P202"
+    loads = (load.force[:, None], load.moment[:, None])
+    assert only(PlateLoads(TIME, ("plate 1",), *loads, declared_feet=(None,), unloaded=(load.unloaded,))).code == "P202"
 
 
 def test_a_plate_that_nobody_stands_on():
@@ -125,8 +125,8 @@ def test_an_unloaded_plate_is_not_in_kilonewtons(noise_n, extra):
         force = np.repeat(noise, steps, axis=0)[: len(TIME)] + np.outer(extra, [0.0, 1.0, 0.0])
         load = without_unloaded_level(TIME, force, np.zeros_like(force))
         assert 0.3 < load.unloaded.peak_n < 20.0
-        each = (load.force[:, None], load.moment[:, None])
-        assert found(PlateLoads(TIME, ("plate 1",), *each, declared_feet=(None,), unloaded=(load.unloaded,))) == []
+        loads = (load.force[:, None], load.moment[:, None])
+        assert found(PlateLoads(TIME, ("plate 1",), *loads, declared_feet=(None,), unloaded=(load.unloaded,))) == []
 
 
 @pytest.mark.parametrize("mass_kg", [None, 20.0])
@@ -152,8 +152,8 @@ def test_an_amplifier_at_the_end_of_its_range(top_n, lost):
     force = plate.force.copy()
     force[..., 1] = np.minimum(force[..., 1], top_n)
     cut = found(replace(plate, force=force))
-    assert [one.code for one in cut] == ["P104"] * lost
-    assert [one.evidence["level_n"].value for one in cut] == [top_n] * lost
+    assert [finding.code for finding in cut] == ["P104"] * lost
+    assert [finding.evidence["level_n"].value for finding in cut] == [top_n] * lost
 
 
 def test_each_plate_is_judged_by_itself():
@@ -164,8 +164,10 @@ def test_each_plate_is_judged_by_itself():
     force[:, 1, 1] = np.minimum(force[:, 1, 1], 600.0)
     moment = np.concatenate([plate.moment, plate.moment], axis=1)
     both = found(PlateLoads(TIME, ("plate 1", "plate 2"), force, moment, (None, None)))
-    own = [(one.code, one.where.plate) for one in both if one.is_open and one.code in ("P104", "P105")]
-    assert own == [("P104", "plate 2"), ("P105", "plate 1")]
+    of_plates = [
+        (finding.code, finding.where.plate) for finding in both if finding.is_open and finding.code in ("P104", "P105")
+    ]
+    assert of_plates == [("P104", "plate 2"), ("P105", "plate 1")]
 
 
 @pytest.mark.parametrize("digits", [0, -1])
@@ -199,18 +201,18 @@ def test_zeros_in_mid_stance():
     plate = plates()
     force = plate.force.copy()
     force[1200:1300] = force[1400:1420] = 0.0
-    lost = [one for one in found(replace(plate, force=force)) if one.code == "P102"]
-    assert [one.where.span_s for one in lost] == [pytest.approx((1.2, 1.299)), pytest.approx((1.4, 1.419))]
+    lost = [finding for finding in found(replace(plate, force=force)) if finding.code == "P102"]
+    assert [finding.where.span_s for finding in lost] == [pytest.approx((1.2, 1.299)), pytest.approx((1.4, 1.419))]
 
 
 @pytest.mark.parametrize(("samples", "code"), [(50, "P102"), (100, None)])
 def test_one_of_two_plates_reads_zero_in_mid_stance(samples, code):
     """For longer it may be two steps on one plate."""
-    one = plates()
-    force, moment = (np.repeat(each, 2, axis=1) for each in (one.force, one.moment))
+    plate = plates()
+    force, moment = (np.repeat(load, 2, axis=1) for load in (plate.force, plate.moment))
     force[1200 : 1200 + samples, 0] = moment[1200 : 1200 + samples, 0] = 0.0
     both = PlateLoads(TIME, ("plate 1", "plate 2"), force, moment, declared_feet=(None, None))
-    lost = [(one.code, one.where.plate) for one in found(both) if one.code == "P102"]
+    lost = [(finding.code, finding.where.plate) for finding in found(both) if finding.code == "P102"]
     assert lost == ([] if code is None else [(code, "plate 1")])
 
 
@@ -225,12 +227,12 @@ def pulse(samples, size_n, axis=1, start=1300):
 @pytest.mark.parametrize("start", [500, 1300])
 def test_a_spike_is_bridged_and_reported(axis, samples, start):
     spiked, sound = plates(extra=pulse(samples, -600.0, axis, start)), plates()
-    one = only(spiked)
+    finding = only(spiked)
     there = plates_alone(sound).along(axis)["axis"]
-    assert (one.code, one.severity, one.where.axis) == ("P109", Severity.CORRECTED, there)
-    assert one.evidence["size_n"].value == pytest.approx(-600.0, abs=5.0)
-    assert one.evidence["spikes"].value == 1
-    assert one.where.span_s[0] == pytest.approx(TIME[start + samples // 2], abs=0.0011)
+    assert (finding.code, finding.severity, finding.where.axis) == ("P109", Severity.CORRECTED, there)
+    assert finding.evidence["size_n"].value == pytest.approx(-600.0, abs=5.0)
+    assert finding.evidence["spikes"].value == 1
+    assert finding.where.span_s[0] == pytest.approx(TIME[start + samples // 2], abs=0.0011)
     np.testing.assert_allclose(spiked.force, sound.force, atol=6.0)
 
 
@@ -248,7 +250,7 @@ def test_what_is_no_spike_stays():
         landing[1100 : 1100 + lasts_ms, 1] = 2500.0 * np.sin(np.pi * (np.arange(lasts_ms) + 0.5) / lasts_ms)
     for extra in (pulse(3, 400.0), np.cumsum(pulse(1, 300.0), axis=0), ringing, *landings):
         assert plates(extra=extra).spikes == ((),)
-        assert [one for one in found(plates(extra=extra)) if one.code == "P109"] == []
+        assert [finding for finding in found(plates(extra=extra)) if finding.code == "P109"] == []
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -270,10 +272,12 @@ def test_repeated_samples(samples, severity):
     force, moment = plate.force.copy(), plate.moment.copy()
     for values in (force, moment):
         values[1200 : 1200 + samples] = values[1200]
-    repeated = [one for one in found(replace(plate, force=force, moment=moment)) if one.is_open]
-    assert [(one.code, one.severity) for one in repeated] == ([] if severity is None else [("P103", severity)])
-    for one in repeated:
-        assert one.where.span_s == pytest.approx((1.2, 1.199 + samples / 1000))
+    repeated = [reported for reported in found(replace(plate, force=force, moment=moment)) if reported.is_open]
+    assert [(finding.code, finding.severity) for finding in repeated] == (
+        [] if severity is None else [("P103", severity)]
+    )
+    for finding in repeated:
+        assert finding.where.span_s == pytest.approx((1.2, 1.199 + samples / 1000))
 
 
 def test_late_forces_that_begin_with_copies_of_the_first_are_not_repeated():
@@ -299,14 +303,16 @@ def test_a_dead_moment_channel_keeps_the_centre_of_pressure_on_a_line(recording_
     recording = recording_of("synthetic/walk.c3d")
     plates = recording.plates
     about = np.cross(plates.corners.mean(axis=1)[None], plates.force)
-    own = plates.moment - about
-    own[:, 0] *= [0.0, 1.0, 1.0]
-    dead = replace(recording, plates=replace(plates, moment=own + about))
-    assert [(one.code, one.where.plate) for one in found(dead.plates) if one.code == "P111"] == [("P111", "plate 1")]
-    assert [one for one in found(plates) if one.code == "P111"] == []
+    moment = plates.moment - about
+    moment[:, 0] *= [0.0, 1.0, 1.0]
+    dead = replace(recording, plates=replace(plates, moment=moment + about))
+    assert [(finding.code, finding.where.plate) for finding in found(dead.plates) if finding.code == "P111"] == [
+        ("P111", "plate 1")
+    ]
+    assert [finding for finding in found(plates) if finding.code == "P111"] == []
     # a depth of the transducers, which readers account for, brings it to life only for horizontal forces
-    deep = own + np.cross([0.0, 0.04, 0.0], plates.force) * [1.0, 1.0, 1.0]
-    assert "P111" in {one.code for one in found(replace(plates, moment=deep + about))}
+    deep = moment + np.cross([0.0, 0.04, 0.0], plates.force) * [1.0, 1.0, 1.0]
+    assert "P111" in {finding.code for finding in found(replace(plates, moment=deep + about))}
 
 
 OTHERS = {
@@ -354,4 +360,4 @@ def test_interference_that_the_unloaded_plate_shows_is_filtered(recording_of):
     force = plates.force + (plates.force[..., 1:2] > 0) * hum[:, None]
     for noise_n, severity in ((18.0, Severity.WARNING), (1.0, Severity.ERROR)):
         known = replace(plates, force=force, noise_n=(noise_n,) * len(plates.names))
-        assert {one.severity for one in mains_interference(plates_alone(known))} == {severity}
+        assert {finding.severity for finding in mains_interference(plates_alone(known))} == {severity}

@@ -63,7 +63,7 @@ def changed(file_of, tmp_path):
             [[table.labels.index(identifier + axis) for axis in "xyz"] for identifier in group]
             for group in COLUMNS[name]
         ]
-        was = [[table.values[:, one] for one in group] for group in places]
+        was = [[table.values[:, column] for column in group] for group in places]
         for group, became in zip(places, how(was), strict=True):
             for columns, new in zip(group, became, strict=True):
                 values[:, columns] = new
@@ -76,7 +76,11 @@ def changed(file_of, tmp_path):
 def columns(plates):
     """What is found of torque columns: not of free moments that a file does not have."""
     found = free_moments(plates_alone(plates))
-    return [one for one in found if one.code != "P264" and one.evidence.get("method") != Quantity("fixed point")]
+    return [
+        finding
+        for finding in found
+        if finding.code != "P264" and finding.evidence.get("method") != Quantity("fixed point")
+    ]
 
 
 @pytest.mark.parametrize("name", SOUND)
@@ -100,8 +104,8 @@ def test_moments_about_another_point(changed, name, axis):
         return [(force, point, torque + np.cross(arm, force)) for force, point, torque in groups]
 
     found = columns(changed(name, other_point))
-    assert [one.code for one in found] == ["P261"] * 2
-    assert [one.evidence["lever_arm_m"].value for one in found] == pytest.approx([0.02] * 2, abs=0.002)
+    assert [finding.code for finding in found] == ["P261"] * 2
+    assert [finding.evidence["lever_arm_m"].value for finding in found] == pytest.approx([0.02] * 2, abs=0.002)
 
 
 @pytest.mark.parametrize("axis", [0, 2])
@@ -114,7 +118,7 @@ def test_free_moment_in_another_column(changed, name, axis):
 
     plates = changed(name, exchange)
     named = plates_alone(plates).along(axis)["axis"]
-    assert [(one.code, one.where.axis) for one in columns(plates)] == [("P262", named)] * 2
+    assert [(finding.code, finding.where.axis) for finding in columns(plates)] == [("P262", named)] * 2
 
 
 @pytest.mark.parametrize("name", GROUPS)
@@ -141,7 +145,7 @@ def test_what_an_unloaded_plate_reads_is_no_torque_of_the_other(changed, name, s
             for force, point, torque in groups
         ]
 
-    assert "P263" not in [one.code for one in columns(changed(name, noisy))]
+    assert "P263" not in [finding.code for finding in columns(changed(name, noisy))]
 
 
 @pytest.mark.parametrize("middle", [(0.0, 0.0, 0.0), (0.9, 0.0, 0.3)])

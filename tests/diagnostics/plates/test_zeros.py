@@ -76,17 +76,20 @@ def test_one_zero_is_one_finding(recording_of, axis):
     )
     force += rng.normal(0.0, 1.0, force.shape)
     moment += rng.normal(0.0, 0.1, moment.shape)
-    each = [without_unloaded_level(plates.time, force[:, p], moment[:, p]) for p in range(2)]
-    read = np.stack([one.force for one in each], axis=1), np.stack([one.moment for one in each], axis=1)
-    corrected = replace(plates, force=read[0], moment=read[1], unloaded=tuple(one.unloaded for one in each))
+    readings = [without_unloaded_level(plates.time, force[:, p], moment[:, p]) for p in range(2)]
+    read = (
+        np.stack([reading.force for reading in readings], axis=1),
+        np.stack([reading.moment for reading in readings], axis=1),
+    )
+    corrected = replace(plates, force=read[0], moment=read[1], unloaded=tuple(reading.unloaded for reading in readings))
     assert codes(found_in(context_of(replace(walk, plates=corrected)))) == ["P216"]
     context = context_of(replace(walk, plates=with_unloaded_levels(corrected)))
     found = found_in(context)
     assert codes(found) == ["P213"]
-    (zero_found,) = [one for one in found if one.is_open]
+    (zero_found,) = [finding for finding in found if finding.is_open]
     assert zero_found.where == context.at(plate=plates.names[0], **context.along(axis))
     assert zero_found.evidence["level_n"].value == pytest.approx(30.0, abs=1.0)
-    assert {one.code for one in found if one.muted_by == "P213"} & {"P212", "P214"}
+    assert {finding.code for finding in found if finding.muted_by == "P213"} & {"P212", "P214"}
 
 
 CHILDREN = here(

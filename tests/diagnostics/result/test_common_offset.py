@@ -19,15 +19,15 @@ def shown(x_sd_m, z_sd_m):
 
 
 def test_along_the_walk_it_goes_unnoticed():
-    (one,) = common_offset(context(shown=shown(0.009, 0.002)))
-    assert (one.code, one.where.plate, one.where.axis) == ("P248", None, "fore-aft")
-    assert one.evidence["detectable_m"].value == pytest.approx(0.028, abs=0.002)
+    (finding,) = common_offset(context(shown=shown(0.009, 0.002)))
+    assert (finding.code, finding.where.plate, finding.where.axis) == ("P248", None, "fore-aft")
+    assert finding.evidence["detectable_m"].value == pytest.approx(0.028, abs=0.002)
 
 
 def test_in_a_short_window_along_both_axes():
     found = list(common_offset(context(shown=shown(0.012, 0.006))))
     assert codes(found) == ["P248", "P248"]
-    assert [one.where.axis for one in found] == ["fore-aft", "mediolateral"]
+    assert [finding.where.axis for finding in found] == ["fore-aft", "mediolateral"]
 
 
 def test_not_where_trials_show_it_or_the_positions_were_checked():

@@ -21,7 +21,7 @@ def moments(*errors_nm_kn, sd=0.6):
 
 @pytest.mark.parametrize("values", [(5.0, -5.8), (-3.5, 2.9), (4.0, -4.0, 4.0)])
 def test_mirror_images_are_the_bodys(values):
-    (cause,) = [one for one in explained(free_moments(context(*moments(*values)))) if one.is_open]
+    (cause,) = [finding for finding in explained(free_moments(context(*moments(*values)))) if finding.is_open]
     assert cause.code == "P268"
     assert cause.severity < Severity.WARNING
     assert cause.evidence["error_nm_n"].value == pytest.approx([value / 1e3 for value in values])
@@ -43,7 +43,9 @@ def test_nothing_is_found_of_fault_free_plates_or_of_uncertain_errors():
 def test_the_sign_of_free_moments(log_odds, expected):
     found = list(free_moments(context(free_moment_sign=FreeMomentSign(log_odds, 2.0))))
     assert codes(found) == expected
-    assert all((one.evidence["log_odds"].value, one.evidence["rms_nm"].value) == (log_odds, 2.0) for one in found)
+    assert all(
+        (finding.evidence["log_odds"].value, finding.evidence["rms_nm"].value) == (log_odds, 2.0) for finding in found
+    )
 
 
 def zeros(trial="walk", axis="x", **values_n):
@@ -55,7 +57,7 @@ def zeros(trial="walk", axis="x", **values_n):
 
 def test_zeros_that_all_plates_have_alike_are_rather_a_force_that_none_measures():
     answers = explained(zero_offsets(context(*zeros(left=-22.0, right=-23.0))))
-    (cause,) = [one for one in answers if one.is_open]
+    (cause,) = [answer for answer in answers if answer.is_open]
     assert (cause.code, cause.severity) == ("P214", Severity.WARNING)
     assert cause.evidence["force_n"].value == -22.5
     assert (cause.where.trial, cause.where.plate, cause.where.axis) == ("walk", None, "fore-aft")
@@ -73,7 +75,7 @@ def test_zeros_of_plates_that_differ_are_theirs(other, count):
 def test_the_zero_of_a_single_plate_is_its_own_also_in_two_trials():
     errors = [*zeros(left=-22.0), *zeros("run", left=-22.0)]
     found = zero_offsets(context(*errors, trials={"walk": walking(), "run": walking()}))
-    assert [(one.code, one.where.trial) for one in found] == [("P215", "walk"), ("P215", "run")]
+    assert [(finding.code, finding.where.trial) for finding in found] == [("P215", "walk"), ("P215", "run")]
 
 
 PLACE = error("position", -0.02, 0.0036, 0.002, "m", moved=3.0, axis="x")
@@ -90,16 +92,16 @@ PLACE = error("position", -0.02, 0.0036, 0.002, "m", moved=3.0, axis="x")
     ],
 )
 def test_an_accusation_needs_support_and_a_finding_two_deviations(changed, supported, found):
-    one = replace(PLACE, **changed)
-    assert (one.supported, one.found) == (supported, found)
-    answers = list(plate_positions(context(one, replace(PLACE, plate="plate 2", value=-0.001))))
+    changed_error = replace(PLACE, **changed)
+    assert (changed_error.supported, changed_error.found) == (supported, found)
+    answers = list(plate_positions(context(changed_error, replace(PLACE, plate="plate 2", value=-0.001))))
     assert codes(answers) == ["P246"] * found
     for answer in answers:
         assert answer.severity is Severity.CORRECTED
-        assert answer.evidence["offset_m"].value == one.value
+        assert answer.evidence["offset_m"].value == changed_error.value
         assert answer.evidence["offset_m"].usual == (-0.0036, 0.0036)
         assert (answer.causes == ("the instrument",)) == supported
-        assert ("another trial" in answer.causes[0]) == bool(one.contradicted_by)
+        assert ("another trial" in answer.causes[0]) == bool(changed_error.contradicted_by)
 
 
 @pytest.mark.parametrize(
@@ -113,7 +115,7 @@ def test_an_accusation_needs_support_and_a_finding_two_deviations(changed, suppo
 )
 def test_directions_are_the_persons_and_axes_the_files(vertical, turned_deg, x, z):
     made = context(PLACE, replace(PLACE, axis="z"), trials={"walk": walking(turned_deg, vertical)})
-    assert [(one.where.axis, one.where.file_axis) for one in plate_positions(made)] == [x, z]
+    assert [(finding.where.axis, finding.where.file_axis) for finding in plate_positions(made)] == [x, z]
 
 
 def test_where_people_walk_along_both_axes_a_direction_has_no_name():
@@ -124,14 +126,16 @@ def test_where_people_walk_along_both_axes_a_direction_has_no_name():
 
 def test_delays_of_all_forces_and_of_one_trial():
     late = error("delay", 0.0101, 0.0044, 0.001, "s", plate=None, moved=2.0)
-    own = replace(late, trial="run", value=-0.02, prior_sd=0.0017)
-    found = list(delays(context(late, own, trials={"walk": walking(), "run": walking()})))
-    assert [(one.code, one.where.trial, one.evidence["delay_s"].value) for one in found] == [
+    of_trial = replace(late, trial="run", value=-0.02, prior_sd=0.0017)
+    found = list(delays(context(late, of_trial, trials={"walk": walking(), "run": walking()})))
+    assert [(finding.code, finding.where.trial, finding.evidence["delay_s"].value) for finding in found] == [
         ("T214", None, 0.0101),
         ("T215", "run", -0.02),
     ]
     assert list(delays(context(replace(late, sd=0.006)))) == []
-    alone = replace(own, trial="walk", value=-0.03)  # its total: there are no other trials that it could differ from
+    alone = replace(
+        of_trial, trial="walk", value=-0.03
+    )  # its total: there are no other trials that it could differ from
     (found_alone,) = delays(context(late, alone, trials={"walk": walking()}))
     assert (found_alone.code, found_alone.evidence["delay_s"].value) == ("T214", -0.03)
 

@@ -72,9 +72,9 @@ def test_nothing_is_ambiguous_where_nothing_is_open(errors, plates, middle_sd_m,
 
 
 def test_equal_errors_are_reported_once_of_all_plates():
-    (one,) = found(ALIKE, ("right", "left"))
-    assert (one.code, one.where.plate) == ("P246", None)
-    assert one.evidence["offset_m"].value == 0.018
+    (finding,) = found(ALIKE, ("right", "left"))
+    assert (finding.code, finding.where.plate) == ("P246", None)
+    assert finding.evidence["offset_m"].value == 0.018
 
 
 def test_columns_of_the_same_name_are_one_plate():

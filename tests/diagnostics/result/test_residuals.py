@@ -38,12 +38,12 @@ def found(force_n=0.0, moment_nm=0.0, external_n=800.0, markers_m=0.008, full=1.
     known = {"trials": (trial,), "file": None, "skeleton": SimpleNamespace(locked={}), "mass_kg": LIGHT_KG}
     fit = SimpleNamespace(**{**known, **changes})
     answers = list(residuals(ResultContext(fit, None)))
-    assert {one.where.trial for one in answers} <= {"walk"}
-    return {one.code: one for one in answers}
+    assert {finding.where.trial for finding in answers} <= {"walk"}
+    return {finding.code: finding for finding in answers}
 
 
 def levels(answers):
-    return {code: one.severity.name for code, one in answers.items()}
+    return {code: finding.severity.name for code, finding in answers.items()}
 
 
 def test_a_good_fit_has_no_finding():
@@ -106,11 +106,11 @@ def test_markers_by_the_guideline(markers_m, expected):
 
 def test_arms_that_the_model_cannot_follow_bar_nothing():
     """Raised arms, 80 mm off, beside legs that fit: 46 mm RMS."""
-    one = found(markers_m=[0.008, 0.008, 0.08])["R304"]
-    assert one.severity.name == "WARNING"
-    assert one.evidence["legs_m"].value == pytest.approx(0.008)
-    assert one.where.markers[0] == "RWRA"
-    assert "arms" in one.effect
+    finding = found(markers_m=[0.008, 0.008, 0.08])["R304"]
+    assert finding.severity.name == "WARNING"
+    assert finding.evidence["legs_m"].value == pytest.approx(0.008)
+    assert finding.where.markers[0] == "RWRA"
+    assert "arms" in finding.effect
     assert found(markers_m=[0.03, 0.03, 0.008])["R304"].severity.name == "ERROR"
 
 
@@ -121,8 +121,8 @@ def test_nobody_is_advised_to_let_move_what_moves_already_or_is_grossly_wrong():
         assert "--calibrate" not in found(file=object(), **given)["R304"].remedy
 
 
-def angles(coordinate, degrees, own=(0.0, 140.0), sd_deg=0.5, stated=False):
-    low, high = np.radians(own)
+def angles(coordinate, degrees, limits_deg=(0.0, 140.0), sd_deg=0.5, stated=False):
+    low, high = np.radians(limits_deg)
     ranges = {coordinate: Range(low, high, clamped=False, stated=stated)}
     trial = SimpleNamespace(
         name="walk",
@@ -135,27 +135,32 @@ def angles(coordinate, degrees, own=(0.0, 140.0), sd_deg=0.5, stated=False):
 
 
 @pytest.mark.parametrize(
-    ("coordinate", "degrees", "own", "severity"),
+    ("coordinate", "degrees", "limits_deg", "severity"),
     [("subtalar_angle_r", -40.0, (-35.0, 35.0), "WARNING"), ("subtalar_angle_r", -41.0, (-35.0, 35.0), "ERROR"),
      ("elbow_flex_l", -20.0, (0.0, 150.0), "ERROR"), ("knee_angle_r", -18.0, (0.0, 140.0), "WARNING"),
      ("knee_angle_l", 18.0, (-160.0, 10.0), "WARNING"), ("knee_flex_r", -21.0, (-10.0, 160.0), "ERROR"),
      ("lumbar_rotation", 66.0, (-90.0, 90.0), "ERROR"), ("ankle_angle_r", 80.0, (-90.0, 90.0), "ERROR")],
 )  # fmt: skip
-def test_angles_that_no_joint_has(coordinate, degrees, own, severity):
-    (one,) = angles(coordinate, degrees, own)
-    assert (one.code, one.severity.name, one.where.trial, one.where.part) == ("R305", severity, "walk", coordinate)
-    assert np.degrees(one.evidence["angle_rad"].value) == pytest.approx(degrees)
-    low, high = one.evidence["range_rad"].value
+def test_angles_that_no_joint_has(coordinate, degrees, limits_deg, severity):
+    (finding,) = angles(coordinate, degrees, limits_deg)
+    assert (finding.code, finding.severity.name, finding.where.trial, finding.where.part) == (
+        "R305",
+        severity,
+        "walk",
+        coordinate,
+    )
+    assert np.degrees(finding.evidence["angle_rad"].value) == pytest.approx(degrees)
+    low, high = finding.evidence["range_rad"].value
     assert not low <= np.radians(degrees) <= high
 
 
 @pytest.mark.parametrize(
-    ("coordinate", "degrees", "own"),
+    ("coordinate", "degrees", "limits_deg"),
     [("subtalar_angle_r", -30.0, (-35.0, 35.0)), ("knee_angle_r", -12.0, (0.0, 140.0)),
      ("knee_angle_l", -110.0, (-160.0, 10.0)), ("hip_flexion_r", 130.0, (-30.0, 120.0)), ("toe_r", 90.0, (0.0, 1.0))],
 )  # fmt: skip
-def test_angles_that_joints_have_and_coordinates_of_unknown_meaning(coordinate, degrees, own):
-    assert angles(coordinate, degrees, own) == []
+def test_angles_that_joints_have_and_coordinates_of_unknown_meaning(coordinate, degrees, limits_deg):
+    assert angles(coordinate, degrees, limits_deg) == []
 
 
 def test_an_angle_that_is_beyond_by_less_than_it_is_uncertain():
@@ -168,5 +173,5 @@ def test_an_angle_that_is_beyond_by_less_than_it_is_uncertain():
 def test_a_range_that_the_user_states_is_the_persons():
     """A knee that bends backwards by 20 degrees, as its owner's does."""
     assert angles("knee_angle_r", -22.0, (-20.0, 150.0), stated=True) == []
-    (one,) = angles("knee_angle_r", -31.0, (-20.0, 150.0), stated=True)
-    assert one.severity.name == "ERROR"
+    (finding,) = angles("knee_angle_r", -31.0, (-20.0, 150.0), stated=True)
+    assert finding.severity.name == "ERROR"

@@ -44,7 +44,7 @@ def test_a_marker_that_sits_elsewhere_than_in_every_other_trial(label, away_m, e
     distances = ({label: 0.001}, {label: away_m})
     found = list(moved_markers(context(trials=TWO, marker_noise=(quiet, quiet), marker_distances_m=distances)))
     assert codes(found) == expected
-    assert [one.where.trial for one in found] == ["run"] * len(expected)
+    assert [finding.where.trial for finding in found] == ["run"] * len(expected)
 
 
 def test_what_calibration_corrected_is_not_silent():
@@ -77,21 +77,21 @@ def test_a_knee_axis_that_the_trials_show_elsewhere(tilts_deg, sd_deg, found):
     nothing = SimpleNamespace(elbow_rotations_rad={}, torso_rotation_rad=None)
     fit = SimpleNamespace(posterior=SimpleNamespace(calibration=entries))
     shown = [*corrected_joints(SimpleNamespace(ready=nothing, fit=fit))]
-    assert [one.code for one in shown] == ["M175"] * len(found)
-    assert [np.degrees(one.evidence["rotation_rad"].value) for one in shown] == pytest.approx(found)
-    assert [one.where.part for one in shown] == ["right knee"] * len(found)
+    assert [finding.code for finding in shown] == ["M175"] * len(found)
+    assert [np.degrees(finding.evidence["rotation_rad"].value) for finding in shown] == pytest.approx(found)
+    assert [finding.where.part for finding in shown] == ["right knee"] * len(found)
 
 
 BOTH = tuple(error("position", 0.020, 0.0036, 0.004, "m", name, axis="z") for name in ("left", "right"))
 
 
-ON_FEET = [one for one in walking_subject().skeleton.markers if one.segment.startswith("foot")]
+ON_FEET = [marker for marker in walking_subject().skeleton.markers if marker.segment.startswith("foot")]
 
 
-LABELS = tuple(one.label for one in ON_FEET)
+LABELS = tuple(marker.label for marker in ON_FEET)
 
 
-RIGHT = tuple(one.label for one in ON_FEET if one.segment == "foot_r")
+RIGHT = tuple(marker.label for marker in ON_FEET if marker.segment == "foot_r")
 
 
 def loads_beside(time, offset_m):
@@ -110,8 +110,8 @@ def walked(recorded_m, corrected_m, seen=LABELS):
     positions = np.zeros((101, len(LABELS), 3))
     positions[..., 2] = sides
     for side in (0.1, -0.1):
-        own = np.flatnonzero(sides == side)
-        positions[:, own, 0] = np.linspace(0.0, 0.25, len(own))
+        of_side = np.flatnonzero(sides == side)
+        positions[:, of_side, 0] = np.linspace(0.0, 0.25, len(of_side))
     markers = Markers(time, LABELS, positions).select(list(seen))
     trial = SimpleNamespace(vertical="+Y", markers=markers, belt=None, loads=loads_beside(time, recorded_m))
     return SimpleNamespace(trial=trial, turned_deg=0.0), loads_beside(time, corrected_m)
@@ -134,11 +134,11 @@ class FacingX:
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_correction_that_takes_loads_away_from_the_feet_is_a_lean(sign):
-    (one,) = found(sign * 0.002, sign * -0.018)
-    assert (one.code, one.where.axis, one.where.plate) == ("M145", "mediolateral", None)
-    assert one.evidence["lean_m"].value == pytest.approx(0.020, abs=1e-6)
-    assert one.evidence["beside_m"].value == pytest.approx((0.002, 0.018), abs=1e-6)
-    assert np.degrees(one.evidence["tilt_rad"].value) == pytest.approx(1.16, abs=0.01)
+    (finding,) = found(sign * 0.002, sign * -0.018)
+    assert (finding.code, finding.where.axis, finding.where.plate) == ("M145", "mediolateral", None)
+    assert finding.evidence["lean_m"].value == pytest.approx(0.020, abs=1e-6)
+    assert finding.evidence["beside_m"].value == pytest.approx((0.002, 0.018), abs=1e-6)
+    assert np.degrees(finding.evidence["tilt_rad"].value) == pytest.approx(1.16, abs=0.01)
 
 
 @pytest.mark.parametrize(
@@ -148,7 +148,7 @@ def test_a_correction_that_takes_loads_away_from_the_feet_is_a_lean(sign):
         (0.016, -0.008, {}),
         (0.000, 0.007, {}),
         (0.002, -0.018, {"errors": (BOTH[0], replace(BOTH[1], value=0.0))}),
-        (0.002, -0.018, {"errors": tuple(replace(one, axis="x") for one in BOTH)}),
+        (0.002, -0.018, {"errors": tuple(replace(plate_error, axis="x") for plate_error in BOTH)}),
         (0.002, -0.018, {"errors": ()}),
         (0.002, -0.018, {"seen": RIGHT}),
     ],

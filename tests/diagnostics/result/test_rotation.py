@@ -29,7 +29,7 @@ def test_from_there_on_rotated_plates_are_likelier(sd_deg):
     least = np.degrees(smallest_detectable(shown(sd_deg), InstrumentPrior(), "turn"))
 
     def odds(value):
-        wide, narrow = (np.hypot(sd_deg, np.degrees(own)) for own in (prior.faulty_sd, prior.nominal_sd))
+        wide, narrow = (np.hypot(sd_deg, np.degrees(error_sd)) for error_sd in (prior.faulty_sd, prior.nominal_sd))
         density = [np.exp(-0.5 * (value / sd) ** 2) / sd for sd in (wide, narrow)]
         return prior.fault_probability * density[0] / ((1 - prior.fault_probability) * density[1])
 
@@ -43,10 +43,10 @@ def test_what_is_shared_with_the_position_of_a_plate_is_not_known_of_the_rotatio
 
 def test_it_is_reported_where_it_matters_only():
     assert list(plate_rotation(context(shown=shown(0.2)))) == []
-    (one,) = plate_rotation(context(shown=shown(1.6)))
-    assert one.code == "P235"
-    assert np.degrees(one.evidence["detectable_rad"].value) == pytest.approx(4.04, abs=0.05)
-    assert np.degrees(one.evidence["of_one_rad"].value) < 1.0
+    (finding,) = plate_rotation(context(shown=shown(1.6)))
+    assert finding.code == "P235"
+    assert np.degrees(finding.evidence["detectable_rad"].value) == pytest.approx(4.04, abs=0.05)
+    assert np.degrees(finding.evidence["of_one_rad"].value) < 1.0
     (single,) = plate_rotation(context(shown=shown(0.2, of_one=1.0 / np.radians(2.0) ** 2)))
     assert single.code == "P235"
     assert np.degrees(single.evidence["of_one_rad"].value) == pytest.approx(6.7, abs=0.7)
@@ -58,20 +58,20 @@ def test_a_rotation_is_an_error_of_all_plates():
     rotated = [
         error("rotation", value, 0.02, 0.004, "rad", plate=plate) for plate, value in (("left", 0.05), ("right", 0.06))
     ]
-    (one,) = plate_rotation(context(*rotated, shown=shown(0.2)))
-    assert (one.code, one.where.plate, one.where.axis) == ("P234", None, None)
-    assert one.evidence["rotation_rad"].value == 0.06
-    unsure = [replace(each, sd=0.04) for each in rotated]
+    (finding,) = plate_rotation(context(*rotated, shown=shown(0.2)))
+    assert (finding.code, finding.where.plate, finding.where.axis) == ("P234", None, None)
+    assert finding.evidence["rotation_rad"].value == 0.06
+    unsure = [replace(plate_error, sd=0.04) for plate_error in rotated]
     assert codes(plate_rotation(context(*unsure, shown=shown(0.2)))) == []
 
 
 @pytest.mark.parametrize("other_rad", [0.001, -0.06])
 def test_a_rotation_that_the_other_plate_does_not_share_is_the_plates_own(other_rad):
-    one, other = (
+    first, other = (
         error("rotation", value, 0.02, 0.004, "rad", plate=plate)
         for plate, value in (("left", 0.09), ("right", other_rad))
     )
-    found = list(plate_rotation(context(one, other, shown=shown(0.2))))
+    found = list(plate_rotation(context(first, other, shown=shown(0.2))))
     assert codes(found) == ["P237"] * (2 if other.found else 1)
     assert found[0].where.plate == "left"
     assert found[0].evidence["rotation_rad"].value == 0.09
@@ -80,9 +80,9 @@ def test_a_rotation_that_the_other_plate_does_not_share_is_the_plates_own(other_
 @pytest.mark.parametrize(("degrees", "severity"), [(9.0, Severity.CORRECTED), (-32.0, Severity.WARNING)])
 def test_a_rotation_as_of_no_plate_stands_for_another_fault(degrees, severity):
     """Interchanged horizontal channels of one plate were "corrected" by a rotation of -32 degrees."""
-    one, other = (
+    first, other = (
         error("rotation", np.radians(value), 0.02, 0.004, "rad", plate=plate)
         for plate, value in (("left", degrees), ("right", 0.1))
     )
-    (found,) = plate_rotation(context(one, other, shown=shown(0.2)))
+    (found,) = plate_rotation(context(first, other, shown=shown(0.2)))
     assert (found.code, found.severity, found.where.plate) == ("P237", severity, "left")

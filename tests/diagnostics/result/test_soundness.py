@@ -39,7 +39,7 @@ def found(posterior=None, **changes):
 
 
 def levels(answers):
-    return [(one.code, one.severity.name) for one in answers]
+    return [(finding.code, finding.severity.name) for finding in answers]
 
 
 def test_a_good_fit_has_no_finding():
@@ -48,17 +48,17 @@ def test_a_good_fit_has_no_finding():
 
 @pytest.mark.parametrize(("posterior", "steps"), [(None, 400), ({"prior_sd": np.ones((2, 10))}, 7)])
 def test_not_converged(posterior, steps):
-    (one,) = found(posterior, converged=False)
-    assert (one.code, one.severity.name, one.evidence["iterations"].value) == ("R201", "ERROR", steps)
+    (finding,) = found(posterior, converged=False)
+    assert (finding.code, finding.severity.name, finding.evidence["iterations"].value) == ("R201", "ERROR", steps)
 
 
 def test_impossible_segments_are_named_and_bodies_without_mass_are_not():
     table = BODY.table()
     table[1, 4:7] = 0.1, 0.5, 0.1
     wrong = BodySegmentParameters.from_table((*BODY.segments, "patella_r"), np.vstack([table, np.zeros(10)]))
-    (one,) = found(estimate=wrong, literature=wrong)
-    assert levels([one]) == [("R202", "ERROR")]
-    assert (one.evidence["segments"].value, one.evidence["count"].value) == ("thigh_r", 1)
+    (finding,) = found(estimate=wrong, literature=wrong)
+    assert levels([finding]) == [("R202", "ERROR")]
+    assert (finding.evidence["segments"].value, finding.evidence["count"].value) == ("thigh_r", 1)
 
 
 def test_light_bodies_that_were_kept_as_a_model_has_them_condemn_nothing():
@@ -66,9 +66,9 @@ def test_light_bodies_that_were_kept_as_a_model_has_them_condemn_nothing():
     toes = np.array([[0.2, 0.03, 0.0, 0.0, 1e-4, 1e-3, 1e-5, 0, 0, 0]])
     body = BodySegmentParameters.from_table((*BODY.segments, "toes_r"), np.vstack([BODY.table(), toes]))
     deviations = np.vstack([np.ones_like(BODY.table()), np.zeros(10)])
-    (one,) = found({"prior_sd": deviations}, estimate=body, literature=body, expected=body)
-    assert levels([one]) == [("R202", "INFO")]
-    assert one.evidence["segments"].value == "toes_r"
+    (finding,) = found({"prior_sd": deviations}, estimate=body, literature=body, expected=body)
+    assert levels([finding]) == [("R202", "INFO")]
+    assert finding.evidence["segments"].value == "toes_r"
 
 
 def test_a_body_without_thickness_is_let_pass():
@@ -81,10 +81,10 @@ def test_a_body_without_thickness_is_let_pass():
 
 def test_centre_of_mass_far_from_the_literature_where_there_is_no_prior():
     moved = replace(BODY, com_m=BODY.com_m + np.array([[0.0], [0.12]]) * [0, 1, 0])
-    (one,) = found(estimate=moved)
-    assert levels([one]) == [("R203", "ERROR")]
-    assert one.where.part == "centre of mass of thigh_r"
-    assert one.evidence["distance_m"].value == pytest.approx(0.12)
+    (finding,) = found(estimate=moved)
+    assert levels([finding]) == [("R203", "ERROR")]
+    assert finding.where.part == "centre of mass of thigh_r"
+    assert finding.evidence["distance_m"].value == pytest.approx(0.12)
     assert found(estimate=replace(BODY, com_m=BODY.com_m + np.array([[0.0], [0.09]]) * [0, 1, 0])) == []
 
 
@@ -93,17 +93,17 @@ def test_parameters_by_prior_deviations(away, expected):
     estimate = BodySegmentParameters.from_table(BODY.segments, BODY.table() + np.eye(2, 10) * away * 0.01)
     answers = found({"prior_sd": np.full((2, 10), 0.01)}, estimate=estimate)
     assert levels(answers) == ([] if expected is None else [("R203", expected)] * 2)
-    parts = [one.where.part for one in answers]
+    parts = [finding.where.part for finding in answers]
     assert parts == ([] if expected is None else ["mass of pelvis", "centre of mass along x of thigh_r"])
-    assert all(one.evidence["distance_sd"].value == pytest.approx(away) for one in answers)
+    assert all(finding.evidence["distance_sd"].value == pytest.approx(away) for finding in answers)
 
 
 def test_who_is_as_was_stated_is_not_far_from_the_prior_for_being_unlike_the_literature():
     measured = BodySegmentParameters.from_table(BODY.segments, BODY.table() + 0.05 * np.eye(2, 10))
     posterior = {"prior_sd": np.full((2, 10), 0.01)}
     assert found(posterior, estimate=measured, expected=measured, more_known=True) == []
-    (one,) = found(posterior, estimate=BODY, expected=measured, more_known=True)[:1]
-    assert one.evidence["source"].value == "the prior"
+    (finding,) = found(posterior, estimate=BODY, expected=measured, more_known=True)[:1]
+    assert finding.evidence["source"].value == "the prior"
 
 
 @pytest.mark.parametrize(("doubted", "expected"), [(1, "WARNING"), (2, "WARNING"), (3, "ERROR")])
@@ -113,7 +113,7 @@ def test_more_than_two_doubted_segments_contradict_the_model(doubted, expected):
     table = np.tile(BODY.table()[:1], (4, 1))
     away = table.copy()
     away[:doubted, :3] += 0.031
-    before, after = (BodySegmentParameters.from_table(segments, one) for one in (table, away))
+    before, after = (BodySegmentParameters.from_table(segments, values) for values in (table, away))
     answers = found({"prior_sd": np.full((4, 10), 0.01)}, literature=before, estimate=after)
     assert levels(answers) == [("R203", expected)] * 3 * doubted
 
@@ -123,15 +123,15 @@ def unlike(both_sides=False, one_sided=None, away=0.0):
     whole = MahalanobisDistance(60.0, 12, 1e-9, ("tibia_l", "torso"), both_sides, one_sided)
     estimate = BodySegmentParameters.from_table(BODY.segments, BODY.table() + away * 0.01 * np.eye(2, 10))
     answers = explained(found({"prior_sd": np.full((2, 10), 0.01), "mahalanobis_distance": whole}, estimate=estimate))
-    return [one for one in answers if one.is_open]
+    return [answer for answer in answers if answer.is_open]
 
 
 def test_a_person_unlike_the_prior():
-    (one,) = unlike()
-    assert levels([one]) == [("R204", "WARNING")]
-    assert (one.evidence["chance"].value, one.evidence["combinations"].value) == (1e-9, 12)
-    assert one.causes[0].startswith("something worn or carried")
-    assert one.causes[-1] == "a prosthesis (prosthesis = true under [segment.tibia_l])"
+    (finding,) = unlike()
+    assert levels([finding]) == [("R204", "WARNING")]
+    assert (finding.evidence["chance"].value, finding.evidence["combinations"].value) == (1e-9, 12)
+    assert finding.causes[0].startswith("something worn or carried")
+    assert finding.causes[-1] == "a prosthesis (prosthesis = true under [segment.tibia_l])"
     assert "joint centre" in unlike(both_sides=True)[0].causes[0]
     assert set(codes(unlike(away=3.5))) == {"R203"}
 
@@ -139,13 +139,13 @@ def test_a_person_unlike_the_prior():
 @pytest.mark.parametrize("added", [True, False])
 def test_a_heavier_side_explains_single_parameters_and_the_whole(added):
     side = OneSided(("tibia_r", "calcn_r"), ("tibia_l", "calcn_l"), (0.9, 0.4), 6.2, added)
-    (one,) = unlike(one_sided=side, away=4.5)
-    assert one.code == "R205"
-    assert one.evidence["difference_kg"].value == (0.9, 0.4)
+    (finding,) = unlike(one_sided=side, away=4.5)
+    assert finding.code == "R205"
+    assert finding.evidence["difference_kg"].value == (0.9, 0.4)
     worn = next(
-        k for k, cause in enumerate(one.causes) if '[[attached]] with segment = "tibia_r" or "calcn_r"' in cause
+        k for k, cause in enumerate(finding.causes) if '[[attached]] with segment = "tibia_r" or "calcn_r"' in cause
     )
-    artificial = next(k for k, cause in enumerate(one.causes) if "[segment.tibia_l] and [segment.calcn_l]" in cause)
+    artificial = next(k for k, cause in enumerate(finding.causes) if "[segment.tibia_l] and [segment.calcn_l]" in cause)
     assert (worn < artificial) == added
 
 
@@ -160,8 +160,8 @@ def test_a_total_mass_that_follows_the_plates(estimated, stated, expected):
     fit = SimpleNamespace(estimate=replace(LITERATURE, mass_kg=estimated * LITERATURE.mass_kg))
     ready = SimpleNamespace(total_mass=TotalMass.of(stated * mass_kg, ()))
     found = list(total_mass(ResultContext(fit, ready)))
-    assert [one.code for one in found] == expected
-    assert all(one.evidence["estimate_kg"].value == pytest.approx(estimated * mass_kg) for one in found)
+    assert [finding.code for finding in found] == expected
+    assert all(finding.evidence["estimate_kg"].value == pytest.approx(estimated * mass_kg) for finding in found)
 
 
 def test_a_motion_that_the_forces_do_not_make_accuses_inverse_kinematics_alone(short_fit):
@@ -186,5 +186,5 @@ def test_an_item_that_does_not_differ_from_nothing(mass_kg, sd, expected):
     deviations = np.full((2, 10), sd * 7.26)
     fit = SimpleNamespace(estimate=estimate, posterior=SimpleNamespace(sd=deviations))
     found = list(attached_items(ResultContext(fit, SimpleNamespace(attached=(pack,)))))
-    assert [(one.code, one.where.part) for one in found] == [("S407", "rucksack")] * expected
-    assert all(one.evidence["mass_kg"].value == 7.26 for one in found)
+    assert [(finding.code, finding.where.part) for finding in found] == [("S407", "rucksack")] * expected
+    assert all(finding.evidence["mass_kg"].value == 7.26 for finding in found)

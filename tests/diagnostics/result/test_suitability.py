@@ -32,7 +32,7 @@ def clear(fit):
 
 
 def uses(fit, *findings, left_out=()):
-    return {one.output: one.use for one in suitability(fit, findings, left_out)}
+    return {rating.output: rating.use for rating in suitability(fit, findings, left_out)}
 
 
 def only(**lower):
@@ -43,8 +43,8 @@ def only(**lower):
 
 def test_every_output_has_a_line_with_a_number(fit, two_level):
     lines = suitability(fit, ())
-    assert [one.output for one in lines] == OUTPUTS
-    assert all(any(letter.isdigit() for letter in one.reason) for one in lines)
+    assert [line.output for line in lines] == OUTPUTS
+    assert all(any(letter.isdigit() for letter in line.reason) for line in lines)
     assert set(list(uses(two_level).values())[1:4]) == {"use with care"}
 
 
@@ -118,7 +118,7 @@ def test_findings_that_correct_and_explain_one_another_end_somewhere(clear):
     zero, force = finding("P212", Where(trial="walk", plate="left")), finding("P214", Where(trial="walk"))
     zeros = [finding("P215", Where(trial="walk", plate=plate)) for plate in ("right", "left")]
     assert uses(clear, *explained([*zeros, zero, force])) == only()
-    circle = [zero.muted("P215"), force.muted("P212"), *(one.muted("P214") for one in zeros)]
+    circle = [zero.muted("P215"), force.muted("P212"), *(zero_found.muted("P214") for zero_found in zeros)]
     assert uses(clear, *circle)["joint moments"] in ("use", "use with care")
 
 
@@ -128,7 +128,7 @@ def test_nothing_is_used_that_did_not_converge(fit):
 
 def test_with_a_trial_left_out_everything_needs_care(clear):
     assert set(uses(clear, left_out=["run"]).values()) == {"use with care"}
-    assert all("1 of 2 trials" in one.reason for one in suitability(clear, (), ["run"]))
+    assert all("1 of 2 trials" in rating.reason for rating in suitability(clear, (), ["run"]))
 
 
 def test_a_chosen_cutoff_and_frames_that_count_less(fit):
@@ -143,9 +143,9 @@ def test_a_chosen_cutoff_and_frames_that_count_less(fit):
 
 def test_what_the_prior_decides(fit, two_level):
     found = list(basis(ResultContext(fit, None)))
-    assert {one.severity for one in found} == {Severity.INFO}
+    assert {reported.severity for reported in found} == {Severity.INFO}
     assert "R403" not in codes(found)
-    few = {one.where.part: one for one in found if one.code == "R404"}
+    few = {reported.where.part: reported for reported in found if reported.code == "R404"}
     inertias = few["moments of inertia"].evidence
     assert inertias["count"].value == 36
     assert inertias["shown"].value < 18
@@ -158,13 +158,16 @@ def offset(value, plate="left"):
 
 @pytest.mark.parametrize(("other", "expected"), [(0.010, []), (0.002, ["S501"])])
 def test_one_person_against_the_others_of_the_session(other, expected):
-    own, others = ([offset(value), offset(0.0, "right")] for value in (0.012, other))
-    found = list(session_contradictions("Anna", own, others))
+    of_person, others = ([offset(value), offset(0.0, "right")] for value in (0.012, other))
+    found = list(session_contradictions("Anna", of_person, others))
     assert codes(found) == expected
-    for one in found:
-        assert one.where.plate == "left"
-        assert [one.evidence[name].value for name in ("error", "other_error")] == [0.012, 0.002]
-        assert [one.evidence[name].value for name in ("person", "instrument")] == ["Anna", "plate left: position x"]
+    for reported in found:
+        assert reported.where.plate == "left"
+        assert [reported.evidence[name].value for name in ("error", "other_error")] == [0.012, 0.002]
+        assert [reported.evidence[name].value for name in ("person", "instrument")] == [
+            "Anna",
+            "plate left: position x",
+        ]
 
 
 def test_a_person_without_others_contradicts_nobody():

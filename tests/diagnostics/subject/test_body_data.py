@@ -28,10 +28,10 @@ STATIC = Recording("static", MARKERS, mass_kg=60.0, height_m=1.7)
 @pytest.mark.parametrize(("mass_kg", "trials"), [(60.5, []), (61.0, ["static"]), (59.0, ["static"])])
 def test_a_stated_mass_that_a_file_contradicts(mass_kg, trials):
     found = list(stated_and_filed(person(static=STATIC, mass_kg=mass_kg, height_m=1.7)))
-    assert [one.where.trial for one in found] == trials
-    for one in found:
-        assert (one.code, one.where.part) == ("S103", "mass")
-        assert (one.evidence["stated"].value, one.evidence["filed"].value) == (mass_kg, 60.0)
+    assert [finding.where.trial for finding in found] == trials
+    for finding in found:
+        assert (finding.code, finding.where.part) == ("S103", "mass")
+        assert (finding.evidence["stated"].value, finding.evidence["filed"].value) == (mass_kg, 60.0)
 
 
 def test_files_that_contradict_each_other():
@@ -68,8 +68,10 @@ def test_markers_that_a_trial_lacks(recording_of):
     static, walk = recording_of("synthetic/static.trc"), recording_of("synthetic/walk.trc")
     marker_set = choose_marker_set(static.markers.labels)
     lost = walk.markers.labels[3]
-    fewer = replace(walk, markers=walk.markers.select([one for one in walk.markers.labels if one != lost]))
-    (whole,), (lacking,) = (list(absent_markers(person([one], static, marker_set))) for one in (walk, fewer))
+    fewer = replace(walk, markers=walk.markers.select([label for label in walk.markers.labels if label != lost]))
+    (whole,), (lacking,) = (
+        list(absent_markers(person([recording], static, marker_set))) for recording in (walk, fewer)
+    )
     assert lacking.code == whole.code == "M105"
     assert set(lacking.where.markers) - set(whole.where.markers) == {lost}
 
@@ -90,7 +92,7 @@ def without(marker_set, segments):
 
 def lacking(recording, gone):
     return replace(
-        recording, markers=recording.markers.select([one for one in recording.markers.labels if one not in gone])
+        recording, markers=recording.markers.select([label for label in recording.markers.labels if label not in gone])
     )
 
 
@@ -105,7 +107,9 @@ def lacking(recording, gone):
 )
 def test_arms_that_no_marker_shows(locked, parts):
     skeleton = walking_subject().skeleton.lock(dict.fromkeys(locked, 0.0))
-    assert [(one.code, one.where.part) for one in unobserved_segments(skeleton)] == [("R401", part) for part in parts]
+    assert [(finding.code, finding.where.part) for finding in unobserved_segments(skeleton)] == [
+        ("R401", part) for part in parts
+    ]
 
 
 @pytest.fixture(scope="module")

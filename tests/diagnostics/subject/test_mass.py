@@ -38,8 +38,8 @@ def trial(made, force=lambda time, force: force, name="walk") -> Trial:
     )
 
 
-def mass_of(made, one):
-    return force_mass(owners_of(made.skeleton), one)
+def mass_of(made, recorded):
+    return force_mass(owners_of(made.skeleton), recorded)
 
 
 def test_it_is_the_mass_of_the_body(made):
@@ -51,16 +51,16 @@ def test_it_is_the_mass_of_the_body(made):
 
 def test_markers_on_bodies_of_no_segment_are_left_out(made):
     """Backpacks and sockets of prostheses have markers, too."""
-    owners, one = owners_of(made.skeleton), trial(made)
+    owners, recorded = owners_of(made.skeleton), trial(made)
     carried = next(label for label, owner in owners.items() if owner == "torso")
-    mass = force_mass({**owners, carried: "backpack"}, one)
-    assert mass.mass_kg == pytest.approx(force_mass({**owners, carried: ""}, one).mass_kg, rel=1e-9)
+    mass = force_mass({**owners, carried: "backpack"}, recorded)
+    assert mass.mass_kg == pytest.approx(force_mass({**owners, carried: ""}, recorded).mass_kg, rel=1e-9)
 
 
 def test_no_motion_of_ours_is_asked(made):
     """Markers of which no pose makes sense say the same as long as their centre moves as it does."""
     turned = replace(made.markers, positions=made.markers.positions[:, :, [2, 1, 0]])
-    fine, odd = (mass_of(made, replace(trial(made), markers=one)) for one in (made.markers, turned))
+    fine, odd = (mass_of(made, replace(trial(made), markers=markers)) for markers in (made.markers, turned))
     assert odd.mass_kg == pytest.approx(fine.mass_kg, rel=1e-9)
 
 
@@ -153,11 +153,11 @@ def standing_on_plates(static, walked, mass_kg):
 def test_a_stated_mass_that_the_forces_contradict(lab, stated_kg, found):
     walked, _, marker_set = lab
     findings = list(stated_mass(person([walked], marker_set=marker_set, mass_kg=stated_kg)))
-    assert [(one.code, one.severity) for one in findings] == found
-    for one in findings:
-        assert one.evidence["mass_by_force_kg"].value == pytest.approx(72.6, abs=1.5)
-        assert one.evidence["stated_kg"].value == stated_kg
-        assert any("handrail" in cause for cause in one.causes) == (stated_kg > 72.6)
+    assert [(finding.code, finding.severity) for finding in findings] == found
+    for finding in findings:
+        assert finding.evidence["mass_by_force_kg"].value == pytest.approx(72.6, abs=1.5)
+        assert finding.evidence["stated_kg"].value == stated_kg
+        assert any("handrail" in cause for cause in finding.causes) == (stated_kg > 72.6)
 
 
 def test_a_declared_rucksack_is_not_accused(lab):
@@ -172,11 +172,11 @@ def test_a_declared_rucksack_is_not_accused(lab):
 def test_mass_in_pounds_and_forces_in_other_units(lab):
     walked, _, marker_set = lab
     pounds = explained(stated_mass(person([walked], marker_set=marker_set, mass_kg=72.6 / POUND)))
-    assert [one.code for one in pounds if one.is_open] == ["S112"]
+    assert [finding.code for finding in pounds if finding.is_open] == ["S112"]
     kilograms = explained(
         stated_mass(person([by_plate(walked, 0.10197, 0.10197)], marker_set=marker_set, mass_kg=72.6))
     )
-    open_ = [(one.code, one.severity) for one in kilograms if one.is_open]
+    open_ = [(finding.code, finding.severity) for finding in kilograms if finding.is_open]
     assert open_ in ([], [("P202", Severity.ERROR)]), "hardly a load is left in some"
 
 
@@ -186,7 +186,7 @@ def test_forces_in_percent_of_body_weight_are_no_wrong_mass(lab, mass_kg):
     walked, _, marker_set = lab
     share = 100.0 / (72.6 * GRAVITY_M_S2)
     found = explained(stated_mass(person([by_plate(walked, share, share)], marker_set=marker_set, mass_kg=mass_kg)))
-    (unit,) = [one for one in found if one.is_open]
+    (unit,) = [finding for finding in found if finding.is_open]
     assert (unit.code, unit.severity, unit.evidence["unit"].value) == ("P202", Severity.ERROR, "% of body weight")
 
 
@@ -232,7 +232,7 @@ def test_a_handrail_for_a_while(lab):
     held = np.where((time > start + third) & (time < end - third), 0.4, 1.0)[:, None, None]
     plates = replace(walked.plates, force=held * walked.plates.force, moment=held * walked.plates.moment)
     found = explained(stated_mass(person([replace(walked, plates=plates)], marker_set=marker_set, mass_kg=72.6)))
-    assert [one.code for one in found if one.is_open] == ["P281"]
+    assert [finding.code for finding in found if finding.is_open] == ["P281"]
     assert found[0].evidence["missing"].value == pytest.approx(0.6, abs=0.2)
 
 
@@ -341,10 +341,10 @@ def test_trials_of_different_masses(lab):
     walked, _, marker_set = lab
     light, heavy = by_plate(walked, 0.85, 0.85), replace(by_plate(walked, 1.02, 1.02), name="heavy")
     found = list(masses_of_trials(person([light, heavy], marker_set=marker_set)))
-    assert [(one.code, one.where.trial) for one in found] == [("S306", light.name), ("S306", "heavy")]
+    assert [(finding.code, finding.where.trial) for finding in found] == [("S306", light.name), ("S306", "heavy")]
     for third in (replace(walked, name="third"), None):
         trials = [light, heavy, third] if third else [light, heavy]
         stated = {} if third else {"mass_kg": 72.6}
         found = list(masses_of_trials(person(trials, marker_set=marker_set, **stated)))
-        assert {one.where.trial for one in found} == {light.name}
+        assert {finding.where.trial for finding in found} == {light.name}
     assert list(masses_of_trials(person([walked, heavy], marker_set=marker_set))) == []

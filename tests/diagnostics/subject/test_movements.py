@@ -31,8 +31,8 @@ def movements():
 
 
 def test_each_motion_is_told_by_what_moves(movements):
-    assert {name for name, each in movements.items() if each.sways} == {"trunk sway", "squat"}
-    assert {name for name, each in movements.items() if each.squats} == {"squat"}
+    assert {name for name, found in movements.items() if found.sways} == {"trunk sway", "squat"}
+    assert {name for name, found in movements.items() if found.squats} == {"squat"}
 
 
 def test_what_is_missing_is_named(recording_of):
@@ -46,8 +46,8 @@ def test_what_is_missing_is_named(recording_of):
         ([], []),
     ):
         found = list(informative_movements(person(trials, marker_set=marker_set)))
-        assert [one.evidence["movements"].value for one in found] == lacking
-        assert {one.code for one in found} <= {"S312"}
+        assert [finding.evidence["movements"].value for finding in found] == lacking
+        assert {finding.code for finding in found} <= {"S312"}
 
 
 def test_a_gap_of_one_marker_is_no_sway():
@@ -77,7 +77,7 @@ TASKS = [
 ]
 
 
-@pytest.mark.parametrize(("markers", "forces", "task"), [one for one in TASKS if is_here(one[:2])])
+@pytest.mark.parametrize(("markers", "forces", "task"), [files for files in TASKS if is_here(files[:2])])
 def test_the_task_is_found(recording_of, markers, forces, task):
     recording = recording_of(markers, forces)
     assert task_of(RecordingContext(recording, marker_set_for(recording.markers.labels))) == task

@@ -115,7 +115,7 @@ def test_the_floor_in_front_of_stairs_is_below_their_plates(standing, down_m, se
 
 
 def test_feet_that_are_not_marked_enough(standing):
-    marks = {name: own for name, own in standing.marker_set.landmarks.items() if "heel" not in name}
+    marks = {name: labels for name, labels in standing.marker_set.landmarks.items() if "heel" not in name}
     assert list(floor(person(replace(standing, marker_set=replace(standing.marker_set, landmarks=marks))))) == []
 
 
@@ -127,7 +127,7 @@ def test_a_foot_that_does_not_stand_flat(standing, landmark, rise_m):
     found = list(flat_feet(moved(standing, positions)))
     name, side = landmark.split("_")
     where = [(name, "right foot" if side == "r" else "left foot")] if rise_m > 0.04 else []
-    assert [(one.evidence["landmark"].value, one.where.part) for one in found] == where
+    assert [(finding.evidence["landmark"].value, finding.where.part) for finding in found] == where
     assert codes(found) == ["S202"] * len(where)
 
 

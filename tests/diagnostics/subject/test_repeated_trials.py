@@ -18,10 +18,10 @@ def walk(recording_of):
 def found(first, other, windows=(None, None)):
     """Code, trial and the other trial of each finding."""
     context = person([first, other])
-    trials = [replace(one, window_s=window) for one, window in zip(context.trials, windows, strict=True)]
+    trials = [replace(trial, window_s=window) for trial, window in zip(context.trials, windows, strict=True)]
     return [
-        (one.code, one.where.trial, one.evidence["other_trial"].value)
-        for one in repeated_trials(replace(context, trials=trials))
+        (finding.code, finding.where.trial, finding.evidence["other_trial"].value)
+        for finding in repeated_trials(replace(context, trials=trials))
     ]
 
 

@@ -47,7 +47,7 @@ def someone(request, recording_of):
 def found(static, walk, marker_set):
     """Findings about the walk against the static trial that no other one explains."""
     context = person([only_markers("walk", walk)], only_markers("static", static), marker_set)
-    return [one for one in explained(static_and_trials(context)) if one.is_open]
+    return [reported for reported in explained(static_and_trials(context)) if reported.is_open]
 
 
 def relabelled(markers, exchanged):
@@ -57,9 +57,11 @@ def relabelled(markers, exchanged):
 def with_heel_moved(markers, marker_set, by_m=0.06):
     """The right heel marker away from the others of its foot, and its label."""
     label = marker_set.landmarks["heel_r"][0]
-    mates = [one for one in marker_set.segments["foot_r"] if one != label and one in markers.labels]
+    mates = [segment for segment in marker_set.segments["foot_r"] if segment != label and segment in markers.labels]
     places = markers.positions.copy()
-    away = places[:, markers.labels.index(label)] - places[:, [markers.labels.index(one) for one in mates]].mean(axis=1)
+    away = places[:, markers.labels.index(label)] - places[:, [markers.labels.index(mate) for mate in mates]].mean(
+        axis=1
+    )
     places[:, markers.labels.index(label)] += by_m * away / np.linalg.norm(away, axis=1, keepdims=True)
     return Markers(markers.time, markers.labels, places), label
 
@@ -74,13 +76,16 @@ def test_the_own_static_trial(someone):
 def test_the_static_trial_of_a_person_of_another_size(someone, size):
     static, walk, marker_set = someone
     other = Markers(static.time, static.labels, size * static.positions)
-    (one,) = found(other, walk, marker_set)
-    assert (one.code, one.severity, one.where.trial) == ("S203", Severity.ERROR, "walk")
-    assert one.evidence["ratio"].value == pytest.approx(1.0 / size, abs=0.02)
+    (reported,) = found(other, walk, marker_set)
+    assert (reported.code, reported.severity, reported.where.trial) == ("S203", Severity.ERROR, "walk")
+    assert reported.evidence["ratio"].value == pytest.approx(1.0 / size, abs=0.02)
 
 
 @pytest.mark.parametrize(
-    "someone", [one for one in PEOPLE if one[0] != "synthetic/static.c3d"], indirect=True, ids=lambda one: one[0]
+    "someone",
+    [files for files in PEOPLE if files[0] != "synthetic/static.c3d"],
+    indirect=True,
+    ids=lambda files: files[0],
 )
 @pytest.mark.parametrize("seed", range(3))
 def test_markers_put_on_anew(someone, seed):
@@ -105,7 +110,7 @@ def test_re_applied_markers_are_not_those_of_another_person(someone):
     contexts = [
         person([walker], only_markers("static", reapplied(static, 0.01, seed)), marker_set) for seed in range(40)
     ]
-    assert sum("S203" in codes(static_and_trials(one)) for one in contexts) <= 1
+    assert sum("S203" in codes(static_and_trials(context)) for context in contexts) <= 1
 
 
 @pytest.mark.parametrize(
@@ -126,7 +131,7 @@ def test_the_static_trial_of_a_person_of_the_same_size(recording_of, by_m, mass_
     moving = replace(only_markers("walk", walk), mass_kg=60.0, height_m=1.70)
     still = replace(only_markers("static", reapplied(static, by_m)), mass_kg=mass_kg, height_m=height_m)
     context = person([moving], still, marker_set)
-    assert codes(one for one in explained(static_and_trials(context)) if one.is_open) == (
+    assert codes(reported for reported in explained(static_and_trials(context)) if reported.is_open) == (
         [] if code is None else [code]
     )
 
@@ -135,28 +140,28 @@ def test_the_static_trial_of_a_person_of_the_same_size(recording_of, by_m, mass_
 def test_the_static_trial_of_somebody_else_of_one_laboratory(recording_of, pair):
     static, walk = map(recording_of, pair)
     context = person([walk], static, choose_marker_set(static.markers.labels))
-    (one,) = [each for each in explained(static_and_trials(context)) if each.is_open]
-    assert (one.code, one.severity, one.where.trial) == ("S203", Severity.ERROR, walk.name)
+    (reported,) = [answer for answer in explained(static_and_trials(context)) if answer.is_open]
+    assert (reported.code, reported.severity, reported.where.trial) == ("S203", Severity.ERROR, walk.name)
 
 
 def test_one_marker_that_was_moved(someone):
     static, walk, marker_set = someone
     moved, label = with_heel_moved(walk, marker_set)
-    mates = [one for one in marker_set.segments["foot_r"] if one in walk.labels]
-    (one,) = found(static, moved, marker_set)
-    if len(mates) < 3 and one.code == "L212":
+    mates = [segment for segment in marker_set.segments["foot_r"] if segment in walk.labels]
+    (reported,) = found(static, moved, marker_set)
+    if len(mates) < 3 and reported.code == "L212":
         return  # of two markers another label may fit, too
-    assert one.code == "M161"
-    assert label in one.where.markers, "with another one where only their distance shows it"
-    assert one.evidence["difference_m"].value == pytest.approx(0.06, abs=0.02)
+    assert reported.code == "M161"
+    assert label in reported.where.markers, "with another one where only their distance shows it"
+    assert reported.evidence["difference_m"].value == pytest.approx(0.06, abs=0.02)
 
 
 @with_joints_and_back
 def test_labels_that_were_exchanged(someone):
     static, walk, marker_set = someone
     knee, ankle = (marker_set.landmarks[f"{name}_lateral_l"][0] for name in ("knee", "ankle"))
-    (one,) = found(static, relabelled(walk, {knee: ankle, ankle: knee}), marker_set)
-    assert (one.code, set(one.where.markers), one.evidence["reference"].value) == (
+    (reported,) = found(static, relabelled(walk, {knee: ankle, ankle: knee}), marker_set)
+    assert (reported.code, set(reported.where.markers), reported.evidence["reference"].value) == (
         "L212",
         {knee, ankle},
         "static trial",
@@ -173,16 +178,16 @@ def test_front_and_back_of_the_pelvis_exchanged_in_one_trial(someone):
         other |= {front: back, back: front}
     findings = found(relabelled(static, other), walk, marker_set)
     assert codes(findings) == ["L212", "L212"]
-    assert {label for one in findings for label in one.where.markers} == set(other)
+    assert {label for reported in findings for label in reported.where.markers} == set(other)
 
 
 @pytest.mark.parametrize("factor", [0.97, 0.985, 1.015, 1.03])
 def test_another_scale_of_the_cameras(someone, factor):
     static, walk, marker_set = someone
     middle = np.nanmean(walk.positions, axis=(0, 1))
-    (one,) = found(static, replace(walk, positions=factor * (walk.positions - middle) + middle), marker_set)
-    assert one.code == "S205"
-    assert one.evidence["scale_error"].value == pytest.approx(factor - 1.0, abs=0.01)
+    (reported,) = found(static, replace(walk, positions=factor * (walk.positions - middle) + middle), marker_set)
+    assert reported.code == "S205"
+    assert reported.evidence["scale_error"].value == pytest.approx(factor - 1.0, abs=0.01)
 
 
 def test_swapped_labels_of_the_static_trial_are_not_the_trials_fault(someone):
@@ -202,16 +207,20 @@ def test_each_of_two_standing_recordings_is_compared(someone):
     other = Markers(static.time, static.labels, 1.1 * static.positions)
     standing = [only_markers("own", static), only_markers("other", other)]
     context = person([only_markers("walk", walk)], marker_set=marker_set, more_statics=standing)
-    (one,) = (each for each in explained(static_and_trials(context)) if each.is_open)
-    assert (one.code, one.where.trial, one.evidence["reference"].value) == ("S203", "other", "trial walk")
+    (reported,) = (answer for answer in explained(static_and_trials(context)) if answer.is_open)
+    assert (reported.code, reported.where.trial, reported.evidence["reference"].value) == (
+        "S203",
+        "other",
+        "trial walk",
+    )
     both = person(
         [only_markers("walk", walk)],
         marker_set=marker_set,
         more_statics=[only_markers("one", other), only_markers("two", other)],
     )
-    (one,) = (each for each in explained(static_and_trials(both)) if each.is_open)
-    assert (one.code, one.where.trial) == ("S203", "walk")
-    assert one.evidence["reference"].value == "standing trial one and standing trial two"
+    (reported,) = (answer for answer in explained(static_and_trials(both)) if answer.is_open)
+    assert (reported.code, reported.where.trial) == ("S203", "walk")
+    assert reported.evidence["reference"].value == "standing trial one and standing trial two"
 
 
 @pytest.fixture(params=WALKERS)
@@ -232,10 +241,10 @@ def test_trials_of_two_people(trials):
     (walk, again, squats), marker_set = trials
     other = with_markers(walk, replace(walk.markers, positions=1.08 * walk.markers.positions))
     findings = list(trials_of_one_person(person([other, again, squats], marker_set=marker_set)))
-    assert {(one.code, one.where.trial) for one in findings} == {("S305", walk.name)}
+    assert {(reported.code, reported.where.trial) for reported in findings} == {("S305", walk.name)}
     assert findings[0].evidence["ratio"].value == pytest.approx(1.08, abs=0.02)
     both = list(trials_of_one_person(person([other, again], marker_set=marker_set)))
-    assert [(one.code, one.where.trial) for one in both] == [("S305", walk.name), ("S305", again.name)]
+    assert [(reported.code, reported.where.trial) for reported in both] == [("S305", walk.name), ("S305", again.name)]
 
 
 def test_a_marker_that_was_moved_between_trials_is_no_other_person(trials):
@@ -244,5 +253,7 @@ def test_a_marker_that_was_moved_between_trials_is_no_other_person(trials):
     moved, label = with_heel_moved(again.markers, marker_set, 0.08)
     spoilt = with_markers(again, moved)
     findings = list(trials_of_one_person(person([walk, spoilt, squats], marker_set=marker_set)))
-    assert {(one.code, one.where.trial, one.where.markers) for one in findings} == {("M161", again.name, (label,))}
-    assert {one.severity for one in findings} == {Severity.WARNING}
+    assert {(reported.code, reported.where.trial, reported.where.markers) for reported in findings} == {
+        ("M161", again.name, (label,))
+    }
+    assert {reported.severity for reported in findings} == {Severity.WARNING}

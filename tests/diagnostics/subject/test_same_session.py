@@ -42,7 +42,7 @@ RUN_ON_A_TREADMILL = KNOWN[-1]
 OTHER_SCALES = [
     (pair, factor) for pair in STATIC for factor in (0.985, 1.015) if factor < 1.0 or pair != RUN_ON_A_TREADMILL
 ]
-PAIRS = [(name, *pair) for name, one in PEOPLE.items() for pair in permutations(one.trials, 2)]
+PAIRS = [(name, *pair) for name, someone in PEOPLE.items() for pair in permutations(someone.trials, 2)]
 MARKER_SETS = {"synthetic": "cleveland-clinic", "subject4": "opencap-mocap"}
 STANDING_AND_TWO_WALKS = named_here(
     {
@@ -84,15 +84,15 @@ def test_another_scale_than_in_the_static_trial(scale_of, pair, factor):
 @pytest.mark.parametrize(("name", "first", "second"), PAIRS)
 def test_trials_of_one_person(recording_of, name, first, second):
     """Of two trials either may be wrong: both are named, with opposite signs."""
-    one, other = (recording_of(*PEOPLE[name].files(trial)) for trial in (first, second))
+    first_trial, other = (recording_of(*PEOPLE[name].files(trial)) for trial in (first, second))
     marker_set = read_marker_set(MARKER_SETS[name])
-    assert list(trial_scales(person([one, other], marker_set=marker_set))) == []
+    assert list(trial_scales(person([first_trial, other], marker_set=marker_set))) == []
     for factor in (0.985, 1.015):
         spoilt = with_markers(other, scaled(other.markers, factor))
-        found = list(trial_scales(person([one, spoilt], marker_set=marker_set)))
+        found = list(trial_scales(person([first_trial, spoilt], marker_set=marker_set)))
         assert codes(found) == ["S205", "S205"]
-        errors = {each.where.trial: each.evidence["scale_error"].value for each in found}
-        assert errors == pytest.approx({other.name: factor - 1.0, one.name: 1.0 - factor}, abs=0.003)
+        errors = {finding.where.trial: finding.evidence["scale_error"].value for finding in found}
+        assert errors == pytest.approx({other.name: factor - 1.0, first_trial.name: 1.0 - factor}, abs=0.003)
 
 
 @pytest.mark.parametrize("spoilt", [0, 1])
@@ -106,5 +106,7 @@ def test_static_trial_and_majority_decide_which_is_wrong(recording_of, name, spo
     assert found.where.trial == walks[spoilt].name
     third = with_markers(walks[1 - spoilt], walks[1 - spoilt].markers, "third")
     found = list(trial_scales(person([*walks, third], marker_set=marker_set)))
-    assert {each.where.trial for each in found} == {walks[spoilt].name}
-    assert [each.where.trial for each in static_and_trials(person(walks, static, marker_set))] == [walks[spoilt].name]
+    assert {finding.where.trial for finding in found} == {walks[spoilt].name}
+    assert [finding.where.trial for finding in static_and_trials(person(walks, static, marker_set))] == [
+        walks[spoilt].name
+    ]

@@ -47,8 +47,8 @@ def test_overlapping_parts_of_one_recording_whose_one_plate_has_a_wrong_gain(per
     parts = []
     for name, (first, last) in {"first": (start, start + part), "second": (end - part, end)}.items():
         inside = within(plates.time, first, last)
-        own = replace(plates, time=plates.time[inside], force=force[inside], moment=moment[inside])
-        recording = replace(whole.recording, name=name, markers=whole.recording.markers.cut(first, last), plates=own)
+        loads = replace(plates, time=plates.time[inside], force=force[inside], moment=moment[inside])
+        recording = replace(whole.recording, name=name, markers=whole.recording.markers.cut(first, last), plates=loads)
         parts.append(RecordingContext(recording, person.marker_set))
     assert list(interchanged_forces(person.together(parts))) == []
 
@@ -57,9 +57,12 @@ def test_interchanged_force_files(person):
     first, second, third = person.names
     trials = [person.context(first, second), person.context(second, first), person.context(third)]
     found = list(interchanged_forces(person.together(trials)))
-    assert [one.code for one in found] == ["S304", "S304"]
-    assert [(one.where.trial, one.evidence["other_trial"].value) for one in found] == [(first, second), (second, first)]
-    assert all(one.evidence["left_crossed"].value < one.evidence["left_own"].value for one in found)
+    assert [finding.code for finding in found] == ["S304", "S304"]
+    assert [(finding.where.trial, finding.evidence["other_trial"].value) for finding in found] == [
+        (first, second),
+        (second, first),
+    ]
+    assert all(finding.evidence["left_crossed"].value < finding.evidence["left_own"].value for finding in found)
 
 
 def test_an_interchange_does_not_hide_the_delay_of_a_third_trial(person):
@@ -70,6 +73,6 @@ def test_an_interchange_does_not_hide_the_delay_of_a_third_trial(person):
         again = person.context(name)
         trials.append(replace(again, recording=replace(again.recording, name=f"{name} again")))
     found = explained(asked(TIMING_PERSON_CHECKS, person.together(trials)))
-    muted = {one.where.trial: one.muted_by for one in found if one.code == "T213"}
+    muted = {finding.where.trial: finding.muted_by for finding in found if finding.code == "T213"}
     assert muted[third] is None
     assert {by for name, by in muted.items() if name in (first, second)} <= {"S304"}

@@ -18,7 +18,7 @@ from kinertia.report.comparison.change_tables import speed_sentence
 def walks(monkeypatch):
     """Walks of which the speed of each stride is stated."""
     monkeypatch.setattr(change, "_speeds", lambda trial: np.array(trial.speeds, dtype=float))
-    return lambda *speeds: [SimpleNamespace(speeds=own) for own in speeds]
+    return lambda *speeds: [SimpleNamespace(speeds=speed) for speed in speeds]
 
 
 def test_strides_of_one_walk_are_no_repeats(walks):
@@ -61,12 +61,17 @@ def test_the_gait_profile_score_of_each_side_is_compared(fit):
     norms = {name: Norm(np.array([0.0, 100.0]), np.zeros(2), np.ones(2)) for name in CLINICAL_ANGLES}
     columns = with_norms(fit.cycles().to_dict("list"), norms, fit.skeleton)
     known = {side: [g for s, g in zip(columns["side"], columns["gps"], strict=True) if s == side] for side in "rl"}
-    found = {one.side: one for one in profile_changes(fit.trials, fit.trials, norms)}
+    found = {profile_change.side: profile_change for profile_change in profile_changes(fit.trials, fit.trials, norms)}
     assert found
-    for side, one in found.items():
-        assert one.before == pytest.approx(np.mean(list(dict.fromkeys(g for g in known[side] if np.isfinite(g)))))
-        assert one.difference == pytest.approx(0.0, abs=1e-12)
-        assert (one.quantity, one.joint, one.component, one.unit) == ("gait", "gait profile", "score", "degrees")
+    for side, changed in found.items():
+        assert changed.before == pytest.approx(np.mean(list(dict.fromkeys(g for g in known[side] if np.isfinite(g)))))
+        assert changed.difference == pytest.approx(0.0, abs=1e-12)
+        assert (changed.quantity, changed.joint, changed.component, changed.unit) == (
+            "gait",
+            "gait profile",
+            "score",
+            "degrees",
+        )
     higher = {name: replace(norm, mean=norm.mean + 30.0) for name, norm in norms.items()}
     (other, *_) = profile_changes(fit.trials, fit.trials, higher)
     assert other.before != pytest.approx(found[other.side].before)

@@ -62,9 +62,9 @@ def test_an_error_of_contacts_cancels_where_it_does_as_much_in_both_conditions(c
 def test_no_change_is_rarely_called_one_and_a_true_one_mostly(own_sd):
     """Whether markers or strides vary more."""
     none, some = ([judged(change, (4, 4), 0.3, own_sd, 0.03, seed) for seed in range(1500)] for change in (0.0, 0.2))
-    assert np.mean([one.verdict == "changed" for one in none]) < 0.08
-    assert np.mean([one.verdict == "changed" for one in some]) > 0.9
-    covered = [abs(one.difference - 0.2) <= one.mdc95 for one in some]
+    assert np.mean([change.verdict == "changed" for change in none]) < 0.08
+    assert np.mean([change.verdict == "changed" for change in some]) > 0.9
+    covered = [abs(change.difference - 0.2) <= change.mdc95 for change in some]
     assert 0.93 < np.mean(covered) < 1.0
 
 
@@ -119,8 +119,8 @@ def twice(fit):
     (trial,), (draws,) = fit.trials, fit.posterior.draws.trials
 
     def under(condition):
-        own = replace(trial.kinematics.trial, name=condition, condition=condition)
-        return replace(trial, kinematics=replace(trial.kinematics, trial=own))
+        walk = replace(trial.kinematics.trial, name=condition, condition=condition)
+        return replace(trial, kinematics=replace(trial.kinematics, trial=walk))
 
     posterior = replace(fit.posterior, draws=replace(fit.posterior.draws, trials=(draws, draws)))
     return replace(fit, trials=(under("barefoot"), under("with shoes")), posterior=posterior)
@@ -134,22 +134,22 @@ def found(twice):
 
 
 def test_a_walk_has_not_changed_from_itself(found):
-    assert {one.quantity for one in found} == {"moment", "angle"}
-    assert {"hip", "knee", "ankle", "lumbar"} <= {one.joint for one in found}
-    assert {one.verdict for one in found} <= {"not shown", "cannot be judged"}
-    assert max(abs(one.difference) for one in found) < 1e-9
-    for one in found:
-        assert set(one.sd_by_source) == set(SOURCES)
-        assert max(one.sd_by_source[source] for source in SOURCES[:3]) < 1e-9, "errors of one walk cancel"
+    assert {change.quantity for change in found} == {"moment", "angle"}
+    assert {"hip", "knee", "ankle", "lumbar"} <= {change.joint for change in found}
+    assert {change.verdict for change in found} <= {"not shown", "cannot be judged"}
+    assert max(abs(change.difference) for change in found) < 1e-9
+    for change in found:
+        assert set(change.sd_by_source) == set(SOURCES)
+        assert max(change.sd_by_source[source] for source in SOURCES[:3]) < 1e-9, "errors of one walk cancel"
 
 
 def test_tables_and_sentences_have_every_outcome(found):
     table = pd.DataFrame(change_columns(found))
     assert len(table) == len(found)
-    assert table["verdict"].tolist() == [one.verdict for one in found]
-    primary = [one for one in found if one.primary]
+    assert table["verdict"].tolist() == [change.verdict for change in found]
+    primary = [change for change in found if change.primary]
     assert len(primary) == len(list(change_sentences(found))) >= 2
-    others = sum(not one.primary and one.verdict != "cannot be judged" for one in found)
+    others = sum(not change.primary and change.verdict != "cannot be judged" for change in found)
     assert f" {others} other" in changed_sentence(found) or others == 0
 
 
@@ -164,10 +164,10 @@ def test_false_discoveries_are_controlled():
 
 
 def test_p_and_verdict_agree(found):
-    judged_ones = [one for one in found if one.verdict != "cannot be judged"]
+    judged_ones = [change for change in found if change.verdict != "cannot be judged"]
     assert judged_ones
-    for one in judged_ones:
-        assert (one.p < 0.05) == (one.verdict == "changed")
+    for change in judged_ones:
+        assert (change.p < 0.05) == (change.verdict == "changed")
 
 
 def test_the_command_compares_conditions_of_a_result(twice, fit, tmp_path):

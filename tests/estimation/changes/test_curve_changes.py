@@ -28,10 +28,10 @@ def compared(seed, strides=4, change=1.0, measured_sd=0.01, stride_sd=0.02, cont
         for side in "rl":
             for k in range(strides):
                 truth = second * change * TRUTH + wavy(rng, stride_sd, 1)[0]
-                own = truth + common[0] + wavy(rng, measured_sd, 1)[0]
+                curve = truth + common[0] + wavy(rng, measured_sd, 1)[0]
                 keys.append((f"{second} {k}", "moment knee_adduction", side, "stride 1"))
-                estimate.append(own)
-                drawn.append(own + drawn_common + wavy(rng, measured_sd, 60))
+                estimate.append(curve)
+                drawn.append(curve + drawn_common + wavy(rng, measured_sd, 60))
         values = np.array(estimate)
         contacts = np.full((1, *values.shape), contacts_sd * second)
         rows.append(Rows(tuple(keys), values, {"all": np.swapaxes(drawn, 0, 1), "contacts": contacts}))
@@ -39,8 +39,8 @@ def compared(seed, strides=4, change=1.0, measured_sd=0.01, stride_sd=0.02, cont
 
 
 def test_an_error_of_contacts_widens_the_band():
-    (one, _), (other, _) = compared(0), compared(0, contacts_sd=0.05)
-    np.testing.assert_allclose(np.square(other.sd) - np.square(one.sd), 0.05**2)
+    (first, _), (other, _) = compared(0), compared(0, contacts_sd=0.05)
+    np.testing.assert_allclose(np.square(other.sd) - np.square(first.sd), 0.05**2)
 
 
 @pytest.mark.parametrize(("measured_sd", "stride_sd"), [(0.02, 0.005), (0.005, 0.02)])
@@ -48,27 +48,27 @@ def test_the_band_holds_the_whole_curve(measured_sd, stride_sd):
     """Whether markers or strides vary more; a band of each percent alone would hold it far less often."""
     together, alone = [], []
     for seed in range(150):
-        for one in compared(seed, measured_sd=measured_sd, stride_sd=stride_sd):
-            low, high = one.band
+        for change in compared(seed, measured_sd=measured_sd, stride_sd=stride_sd):
+            low, high = change.band
             together.append(((low <= TRUTH) & (high >= TRUTH)).all())
-            alone.append((np.abs(one.difference - TRUTH) <= 1.96 * one.sd).all())
+            alone.append((np.abs(change.difference - TRUTH) <= 1.96 * change.sd).all())
     assert 0.92 <= np.mean(together) <= 0.995
     assert np.mean(alone) < 0.85
 
 
 def test_a_change_is_shown_where_it_is():
-    found = [one for seed in range(20) for one in compared(seed, 5, 1.0, 0.005, 0.01)]
-    assert np.mean([one.changed[30] for one in found]) > 0.9
-    assert np.mean([one.changed[90] for one in found]) < 0.1
-    none = [one.changed.any() for seed in range(150) for one in compared(seed, 5, 0.0, 0.005, 0.01)]
+    found = [change for seed in range(20) for change in compared(seed, 5, 1.0, 0.005, 0.01)]
+    assert np.mean([change.changed[30] for change in found]) > 0.9
+    assert np.mean([change.changed[90] for change in found]) < 0.1
+    none = [change.changed.any() for seed in range(150) for change in compared(seed, 5, 0.0, 0.005, 0.01)]
     assert np.mean(none) < 0.08
 
 
 def test_single_strides_have_no_band():
-    for one in compared(0, strides=1):
-        assert np.isnan(one.factor)
-        assert not one.changed.any()
-        assert np.isfinite(one.difference).all()
+    for change in compared(0, strides=1):
+        assert np.isnan(change.factor)
+        assert not change.changed.any()
+        assert np.isfinite(change.difference).all()
 
 
 def test_tables_and_figures_have_every_curve():
@@ -76,7 +76,7 @@ def test_tables_and_figures_have_every_curve():
     columns = curve_columns(found)
     assert {len(values) for values in columns.values()} == {2 * 101}
     assert columns["lower"][130] == pytest.approx(found[1].band[0][29])
-    assert [one["title"] for one in curve_figures(found, "a", "b")] == ["Knee moments"]
+    assert [curve_figure["title"] for curve_figure in curve_figures(found, "a", "b")] == ["Knee moments"]
     figure = joint_figure(found, "Knee moments", "a", "<b>")
     assert len([trace for trace in figure.data if trace.get("name") == "difference"]) == 2
     assert "<b>" not in str([trace.get("name") for trace in figure.data])

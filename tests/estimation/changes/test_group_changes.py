@@ -31,7 +31,7 @@ def test_errors_of_measurement_are_told_from_how_differently_people_change():
     random = np.random.default_rng(5)
     true = random.normal(-0.2, 0.04, 2000)
     measured = true + random.normal(0.0, 0.03, 2000)
-    people = {str(k): [change(0.5, 0.5 + one, sd=0.03)] for k, one in enumerate(measured)}
+    people = {str(k): [change(0.5, 0.5 + measured_change, sd=0.03)] for k, measured_change in enumerate(measured)}
     (found,) = group_changes(people)
     assert found.sd == pytest.approx(0.05, rel=0.05)
     assert found.sd_measurement == pytest.approx(0.03)

@@ -26,8 +26,8 @@ def trial_under(trial, condition, shift_m=0.0):
     """A walk under a condition, at another place where it is another recording."""
     markers = trial.kinematics.trial.markers
     moved = replace(markers, positions=markers.positions + shift_m)
-    own = replace(trial.kinematics.trial, name=condition, condition=condition, markers=moved)
-    return replace(trial, kinematics=replace(trial.kinematics, trial=own))
+    walk = replace(trial.kinematics.trial, name=condition, condition=condition, markers=moved)
+    return replace(trial, kinematics=replace(trial.kinematics, trial=walk))
 
 
 def session_of(fit, condition, shift_m, walks=3):
@@ -36,8 +36,11 @@ def session_of(fit, condition, shift_m, walks=3):
     posterior = replace(fit.posterior, draws=replace(fit.posterior.draws, trials=(draws,) * walks))
     trials = [trial_under(trial, condition, shift_m) for _ in range(walks)]
     named = [
-        replace(one, kinematics=replace(one.kinematics, trial=replace(one.kinematics.trial, name=f"{condition} {k}")))
-        for k, one in enumerate(trials)
+        replace(
+            walked,
+            kinematics=replace(walked.kinematics, trial=replace(walked.kinematics.trial, name=f"{condition} {k}")),
+        )
+        for k, walked in enumerate(trials)
     ]
     return replace(fit, trials=tuple(named), posterior=posterior)
 
@@ -59,41 +62,43 @@ def found(sessions):
 
 
 def test_a_walk_has_not_changed_from_itself(found):
-    assert {one.verdict for one in found} <= {"not shown", "cannot be judged"}
-    assert max(abs(one.difference) for one in found) < 1e-9
-    assert {"moment", "angle"} == {one.quantity for one in found}
+    assert {change.verdict for change in found} <= {"not shown", "cannot be judged"}
+    assert max(abs(change.difference) for change in found) < 1e-9
+    assert {"moment", "angle"} == {change.quantity for change in found}
 
 
 def test_the_body_cancels_and_markers_do_not(found):
-    for one in found:
-        assert one.sd_by_source["body"] < 1e-6
-    moments = [one.sd_by_source["markers"] for one in found if one.quantity == "moment" and one.joint == "knee"]
+    for change in found:
+        assert change.sd_by_source["body"] < 1e-6
+    moments = [
+        change.sd_by_source["markers"] for change in found if change.quantity == "moment" and change.joint == "knee"
+    ]
     assert min(moments) > 1e-3
 
 
 def test_the_deviation_is_that_of_two_independent_sessions(fit, found):
     """Angles do not depend on the body: their variances add up."""
     (trial,) = fit.trials
-    one = next(c for c in found if (c.quantity, c.joint, c.side, c.event) == ("angle", "knee", "r", "mid-stance"))
+    change = next(c for c in found if (c.quantity, c.joint, c.side, c.event) == ("angle", "knee", "r", "mid-stance"))
     column = fit.skeleton.coordinates.index("knee_angle_r")
     sd = np.degrees(trial.joint_curves.deviations.coordinates[:, column].mean())
     factor = module._FIXED_AXES if session(fit).fixed_axes else 1.0
-    assert one.sd_by_source["markers"] == pytest.approx(factor * np.sqrt(2.0) * sd, rel=0.4)
+    assert change.sd_by_source["markers"] == pytest.approx(factor * np.sqrt(2.0) * sd, rel=0.4)
 
 
 def test_contacts_that_no_plate_measured_are_uncertain(fit):
     """By as much as a later contact changes each average; those of plates are not."""
     (trial,) = fit.trials
-    own = _Strides.of([trial])
+    strides = _Strides.of([trial])
     edges = load_edges(trial.kinematics.trial.loads)
     for side, kind in _CONTACTS:
-        measured = [one.time_s for one in edges if one[1:] == (side, kind)]
-        for one, other in zip(own.strides[0], own.later([trial], side, kind).strides[0], strict=True):
-            times = {name: getattr(other, name) - getattr(one, name) for name in TIMES}
+        measured = [edge.time_s for edge in edges if edge[1:] == (side, kind)]
+        for stride, other in zip(strides.strides[0], strides.later([trial], side, kind).strides[0], strict=True):
+            times = {name: getattr(other, name) - getattr(stride, name) for name in TIMES}
             moved = {name for name, later in times.items() if later != 0.0 and np.isfinite(later)}
             assert {round(times[name], 9) for name in moved} <= {CONTACT_SD_S}
-            assert not [t for name in moved for t in measured if abs(getattr(one, name) - t) < 0.002]
-            strike = one.opposite_strike_s if one.side != side else one.start_s
+            assert not [t for name in moved for t in measured if abs(getattr(stride, name) - t) < 0.002]
+            strike = stride.opposite_strike_s if stride.side != side else stride.start_s
             if (
                 kind == "heel strike"
                 and np.isfinite(strike)
@@ -106,20 +111,20 @@ def test_a_changed_knee_is_found(sessions):
     before, after = sessions
     column = after.skeleton.coordinates.index("knee_angle_r")
     bent = []
-    for one in after.trials:
-        trajectory = one.trajectory.copy()
+    for trial in after.trials:
+        trajectory = trial.trajectory.copy()
         trajectory[:, column] -= np.radians(20.0)
-        curves = one.joint_curves
+        curves = trial.joint_curves
         q = curves.motion.q.copy()
         q[:, column] -= np.radians(20.0)
         motion = replace(curves.motion, q=q)
-        bent.append(replace(one, trajectory=trajectory, joint_curves=replace(curves, motion=motion)))
+        bent.append(replace(trial, trajectory=trajectory, joint_curves=replace(curves, motion=motion)))
     found = compared(before, replace(after, trials=tuple(bent)))
-    knee = [one for one in found if (one.quantity, one.joint, one.side) == ("angle", "knee", "r")]
-    assert {one.verdict for one in knee} == {"changed"}
-    assert [one.difference for one in knee] == pytest.approx([-20.0] * len(knee), abs=1.0)
-    other = [one for one in found if (one.quantity, one.joint, one.side) == ("angle", "knee", "l")]
-    assert {one.verdict for one in other} == {"not shown"}
+    knee = [change for change in found if (change.quantity, change.joint, change.side) == ("angle", "knee", "r")]
+    assert {change.verdict for change in knee} == {"changed"}
+    assert [change.difference for change in knee] == pytest.approx([-20.0] * len(knee), abs=1.0)
+    other = [change for change in found if (change.quantity, change.joint, change.side) == ("angle", "knee", "l")]
+    assert {change.verdict for change in other} == {"not shown"}
 
 
 def test_results_of_one_session_alone_are_pointed_out(sessions):
@@ -127,8 +132,8 @@ def test_results_of_one_session_alone_are_pointed_out(sessions):
     wide = np.random.default_rng(0).normal(0.0, 0.01, draws.places.shape)
     for places, narrow in ((draws.places, True), (wide, False)):
         fits = [
-            replace(one, posterior=replace(one.posterior, draws=replace(one.posterior.draws, places=places)))
-            for one in sessions
+            replace(fitted, posterior=replace(fitted.posterior, draws=replace(fitted.posterior.draws, places=places)))
+            for fitted in sessions
         ]
         assert session(fits[0]).narrow_markers is narrow
         with pytest.MonkeyPatch.context() as patch:
@@ -145,7 +150,7 @@ def test_both_are_evaluated_with_one_body(sessions):
     table = after.estimate.table().copy()
     table[:, 0] *= np.where(np.char.startswith(np.array(after.estimate.segments), "shank"), 1.3, 1.0)
     other = replace(after, estimate=BodySegmentParameters.from_table(after.estimate.segments, table))
-    differences = np.array([one.difference for one in compared(before, other, draws=2)])
+    differences = np.array([change.difference for change in compared(before, other, draws=2)])
     assert np.abs(differences).max() < 1e-9
 
 

@@ -11,7 +11,7 @@ from kinertia.report.figures.cycle_figures import drawn_curves
 from kinertia.report.pages.cycle_table import peak_rows
 
 STRIDE = Stride("r", 1, 0.0, 1.0, 0.6, 0.1, 0.5, True)
-FIRST, SECOND, IMPULSE = (one.name for one in PEAKS[:3])
+FIRST, SECOND, IMPULSE = (peak.name for peak in PEAKS[:3])
 
 
 def adduction(known=PERCENT >= 0):
@@ -66,7 +66,7 @@ def test_a_landing_has_peaks_of_its_own():
     landing = replace(adduction(), stride=replace(STRIDE, end_s=0.2, toe_off_s=0.2, phase="landing"), task="landing")
     peaks = found(landing)
     assert set(peaks) == {"knee adduction moment, external, landing", "knee abduction moment, external, landing"}
-    assert set(peaks) <= {one.name for one in LANDING_PEAKS}
+    assert set(peaks) <= {peak.name for peak in LANDING_PEAKS}
     assert peaks["knee adduction moment, external, landing"] == pytest.approx((0.5, 0.05, 15.0), abs=1e-3)
     columns = peak_columns([landing])
     assert set(columns["task"]) == set(columns["phase"]) == {"landing"}

@@ -42,7 +42,7 @@ def drawn(fit):
 
 def test_joint_moments_spread_as_reported(fit, drawn):
     (trial,) = fit.trials
-    moments = np.array([one.trials[0].joint_loads["estimate"] for one in drawn])
+    moments = np.array([draw.trials[0].joint_loads["estimate"] for draw in drawn])
     ratio = spread_over_reported(moments, trial)
     np.testing.assert_allclose(ratio, 1.0, atol=SYSTEMATIC + sampling(len(drawn)))
     assert np.median(ratio) == pytest.approx(1.0, abs=SYSTEMATIC)
@@ -61,20 +61,20 @@ def not_drawn(demo_run):
 
 def test_angles_and_parameters_spread_as_reported(fit, drawn, not_drawn):
     (trial,) = fit.trials
-    q = np.array([one.trials[0].motion.q for one in drawn]) - trial.motion.q
+    q = np.array([draw.trials[0].motion.q for draw in drawn]) - trial.motion.q
     reported = np.square(trial.deviations.coordinates) - not_drawn
     ratio = np.sqrt(np.square(q).mean(axis=(0, 1)) / reported.mean(axis=0))
     np.testing.assert_allclose(ratio, 1.0, atol=SYSTEMATIC + sampling(len(drawn)))
-    mass = np.array([one.estimate.mass_kg for one in drawn])
+    mass = np.array([draw.estimate.mass_kg for draw in drawn])
     np.testing.assert_allclose(mass.std(axis=0), fit.posterior.sd[:, 0], rtol=SYSTEMATIC + sampling(len(drawn)))
     assert mass.sum(axis=1).std() < 0.5, "the scale knows the sum"
-    assert all(one.estimate.physically_consistent().all() for one in drawn)
+    assert all(draw.estimate.physically_consistent().all() for draw in drawn)
 
 
 def test_errors_of_plates_spread_as_reported(fit):
     """Gains of force plates, which are drawn together with everything else."""
     draws = kept_draws(fit)
-    reported = {each.plate: each.sd for each in fit.posterior.calibration if each.quantity == GAIN_OF_PLATE}
+    reported = {entry.plate: entry.sd for entry in fit.posterior.calibration if entry.quantity == GAIN_OF_PLATE}
     gains = draws.trials[0].plates[:, :, GAIN]
     assert len(reported) == gains.shape[1]
     np.testing.assert_allclose(gains.std(axis=0), [*reported.values()], rtol=SYSTEMATIC + sampling(len(gains)))
@@ -85,12 +85,12 @@ def test_parts_of_a_draw_belong_together(fit, drawn):
     time = fit.trials[0].time
 
     def residual(body, moved) -> float:
-        (own,) = moved.trials
-        loads = inverse_dynamics(own.skeleton, body.estimate, own.motion, own.reactions.at(time))
+        (trial,) = moved.trials
+        loads = inverse_dynamics(trial.skeleton, body.estimate, trial.motion, trial.reactions.at(time))
         return float(np.square(loads[:, :6]).mean())
 
-    together = [residual(one, one) for one in drawn[:60]]
-    mixed = [residual(one, other) for one, other in pairwise(drawn[:61])]
+    together = [residual(draw, draw) for draw in drawn[:60]]
+    mixed = [residual(draw, other) for draw, other in pairwise(drawn[:61])]
     assert np.mean(mixed) > 1.5 * np.mean(together)
 
 
@@ -141,7 +141,7 @@ def test_places_rates_and_accelerations_are_narrowed_by_their_own_shares(shares)
     inner = slice(30, -30)
     for order, share in enumerate(shares):
         before, after = (
-            np.mean([np.square(basis.evaluate(each)[order][inner]).mean() for each in some])
+            np.mean([np.square(basis.evaluate(draws_of_motion)[order][inner]).mean() for draws_of_motion in some])
             for some in (alone, narrowed)
         )
         assert after / before == pytest.approx(share, rel=0.15)
@@ -152,8 +152,8 @@ def test_splines_of_few_frames_do_not_leak_into_others():
     basis, alone = _curves(5.96)
     loose = alone.copy()
     loose[:, -1] *= 400.0
-    for each in (alone, loose):
-        posterior_draws._narrow(each, np.array([1.0, 0.8, 0.4]), basis)
+    for motions in (alone, loose):
+        posterior_draws._narrow(motions, np.array([1.0, 0.8, 0.4]), basis)
     last = basis.evaluate(np.square(loose - alone).mean(axis=0), slice(-80, -20))[0]
     assert last.max() < 0.01 * np.square(alone).mean()
 

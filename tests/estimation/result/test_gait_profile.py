@@ -100,7 +100,7 @@ def test_foot_progression_follows_heel_and_toe_markers(fit, curves, sides):
     (trial,) = fit.trials
     feet = feet_under_pelvis(trial.skeleton, trial.kinematics)
     for side in sides:
-        stride = next(one for one in trial.strides if one.side == side)
+        stride = next(candidate for candidate in trial.strides if candidate.side == side)
         rows = np.searchsorted(feet.time, stride.time[5:50])
         along = (feet.toe[side] - feet.heel[side])[rows]
         markers = np.degrees(np.arctan2(-along[:, 2], along[:, 0])) * (1.0 if side == "r" else -1.0)
@@ -145,9 +145,9 @@ def test_scores_of_each_stride_stand_in_the_table_of_cycles(fit, sides):
     stride = table[(table.side == side) & (table.stride == 1)]
     squares = []
     for quantity in CLINICAL_ANGLES:
-        one = stride[stride.quantity == quantity]
-        squares.append(np.square(one.value).mean())
-        np.testing.assert_allclose(one.gvs, np.sqrt(squares[-1]))
+        of_quantity = stride[stride.quantity == quantity]
+        squares.append(np.square(of_quantity.value).mean())
+        np.testing.assert_allclose(of_quantity.gvs, np.sqrt(squares[-1]))
     np.testing.assert_allclose(stride.gps.dropna(), np.sqrt(np.mean(squares)))
     assert table[table.quantity == "knee_angle_moment"].norm.isna().all()
 
@@ -155,8 +155,8 @@ def test_scores_of_each_stride_stand_in_the_table_of_cycles(fit, sides):
 def test_norms_of_other_people_are_said_to_be(fit):
     def said(age, **norm):
         person = replace(fit, subject=fit.subject.model_copy(update={"age_years": age}))
-        one = Norm(np.zeros(1), np.zeros(1), np.zeros(1), 4, "Kinertia gait27", **norm)
-        return " ".join(remarks(person, one))
+        norm_ = Norm(np.zeros(1), np.zeros(1), np.zeros(1), 4, "Kinertia gait27", **norm)
+        return " ".join(remarks(person, norm_))
 
     assert said(35.0, age_years=(20.0, 40.0), speed_m_s=(0.1, 9.0)) == ""
     assert "35 years old, people in the norms 7 to 11" in said(35.0, age_years=(7.0, 11.0))

@@ -37,8 +37,8 @@ def test_only_known_moments_count(fit, side, foot):
     """From three quarters of the stance on nothing is known."""
     (trial,) = fit.trials
     k, curves = trial.kinematics, trial.joint_curves
-    own = curves.joints["estimate"].joints.index(f"hip_{side}")
-    known = np.isfinite(curves.joints["estimate"].moments[:, own, 0])
+    hip = curves.joints["estimate"].joints.index(f"hip_{side}")
+    known = np.isfinite(curves.joints["estimate"].moments[:, hip, 0])
     ground = k.trial.on_ground[k.trajectory_frames, foot]
     stance = np.flatnonzero(known & ground)
     late = k.trial.markers.time > curves.time[stance[3 * len(stance) // 4]]
@@ -115,17 +115,19 @@ def test_a_foot_that_is_partly_on_its_plate(interrupted):
 
 def test_a_plate_under_both_feet(interrupted):
     trial, changed, here, span = interrupted
-    own = lost(trial, here)
-    shared = replace(own, loads=replace(own.loads, on_shared_plate=np.ones(len(own.loads.time), dtype=bool)))
+    measured = lost(trial, here)
+    shared = replace(
+        measured, loads=replace(measured.loads, on_shared_plate=np.ones(len(measured.loads.time), dtype=bool))
+    )
     assert reasons(changed(trial=shared), span) == {SHARED}
 
 
 def test_a_foot_beside_the_plates(interrupted):
     trial, changed, here, span = interrupted
-    own = lost(trial, here)
-    force = own.loads.force.copy()
+    measured = lost(trial, here)
+    force = measured.loads.force.copy()
     force[:, FOOT] = 0.0
-    beside = changed(trial=replace(own, loads=replace(own.loads, force=force)))
+    beside = changed(trial=replace(measured, loads=replace(measured.loads, force=force)))
     assert reasons(beside, span) == {BESIDE}
     assert f"{BESIDE} (" in gaps_sentence([beside])
 

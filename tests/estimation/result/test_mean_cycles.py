@@ -68,7 +68,7 @@ def both(fit):
 
 def test_walks_come_first(both):
     tasks = fits_by_task(both)
-    assert {task: [trial.name for trial in own.trials] for task, own in tasks.items()} == {
+    assert {task: [trial.name for trial in task_fit.trials] for task, task_fit in tasks.items()} == {
         "walk": ["walk"],
         "turn": ["turn"],
     }

@@ -63,9 +63,9 @@ def test_error_bars_of_hips_are_those_of_their_generalised_forces(result):
                 known = np.isfinite(found)
                 assert (found[known] >= 0.999 * expected[known]).all()
                 flexion = curves.joints["estimate"].moments[known, hip, 0]
-                own = np.mean(np.square(found[known]) - np.square(expected[known]))
+                added = np.mean(np.square(found[known]) - np.square(expected[known]))
                 # forces are averaged over their uncertain delay there
-                assert np.sqrt(own) == pytest.approx(CENTRE_SD_M / thigh_m * np.sqrt(np.mean(flexion**2)), rel=0.02)
+                assert np.sqrt(added) == pytest.approx(CENTRE_SD_M / thigh_m * np.sqrt(np.mean(flexion**2)), rel=0.02)
             else:
                 np.testing.assert_allclose(found, expected, rtol=1e-3)
 

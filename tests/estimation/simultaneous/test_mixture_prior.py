@@ -134,7 +134,7 @@ def of_all_ways(priors, data, rhs):
 @pytest.mark.parametrize("count", [1, 4, 7])
 def test_the_posterior_is_that_of_all_ways_to_be_sound_or_faulty(count):
     rng = np.random.default_rng(count)
-    priors = [FaultMixture(0.001, 0.015, *of) for of in rng.uniform([0.02, -0.01], [0.3, 0.01], (count, 2))]
+    priors = [FaultMixture(0.001, 0.015, *shares) for shares in rng.uniform([0.02, -0.01], [0.3, 0.01], (count, 2))]
     jacobian = rng.normal(size=(2 * count, count)) / 0.006
     data, rhs = jacobian.T @ jacobian, jacobian.T @ rng.normal(0.0, 2.0, 2 * count)
     mean, covariance = of_all_ways(priors, data, rhs)
@@ -185,8 +185,8 @@ def test_drawn_instruments_have_the_prior_s_deviation(prior):
 
 def test_chance_of_data_is_their_mean_under_the_priors():
     """Of two errors that are added to a common one, against sums over a fine grid."""
-    own, both = FaultMixture(0.3, 2.0, 0.2), FaultMixture(0.5, 1.5, 0.1, faulty_mean=1.0)
-    priors = ErrorPriors((own, own), ((both, (0, 1)),))
+    single, both = FaultMixture(0.3, 2.0, 0.2), FaultMixture(0.5, 1.5, 0.1, faulty_mean=1.0)
+    priors = ErrorPriors((single, single), ((both, (0, 1)),))
     data = np.array([[2.0, 0.5], [0.5, 1.0]])
     grid = np.linspace(-9.0, 9.0, 181)
 
@@ -197,11 +197,11 @@ def test_chance_of_data_is_their_mean_under_the_priors():
 
     a, b, c = np.meshgrid(grid, grid, grid, indexing="ij", sparse=True)
     x, y = a + c, b + c
-    each = density(own)[:, None, None] * density(own)[None, :, None] * density(both)[None, None, :]
+    densities = density(single)[:, None, None] * density(single)[None, :, None] * density(both)[None, None, :]
 
     def summed(rhs):
         square = data[0, 0] * x**2 + 2 * data[0, 1] * x * y + data[1, 1] * y**2
-        return np.log((each * np.exp(rhs[0] * x + rhs[1] * y - 0.5 * square)).sum())
+        return np.log((densities * np.exp(rhs[0] * x + rhs[1] * y - 0.5 * square)).sum())
 
     rights = [np.array([3.0, -1.0]), np.array([0.2, 0.1])]
     found = [log_chance(priors, data, rhs) for rhs in rights]

@@ -169,16 +169,18 @@ def test_trials_of_one_person(trial):
     turned = trial.skeleton.pose(q).rotation[:, trial.skeleton.marker_segments[thigh]]
     positions = walks[1].positions.copy()
     positions[:, thigh] += turned @ [0.0, 0.0, 0.015]
-    alike = observe(trial.skeleton, [kinematics_of(trial, each) for each in walks], MASS_KG, [Bandwidth(10.0)] * 2)
+    alike = observe(trial.skeleton, [kinematics_of(trial, walk) for walk in walks], MASS_KG, [Bandwidth(10.0)] * 2)
     assert alike.repeats == pytest.approx(np.ones((2, 2)), abs=0.1)
     assert np.max(alike.pooled[0].displacement_sd_m) < 0.001
-    kinematics = [kinematics_of(trial, each) for each in (walks[0], replace(walks[1], positions=positions))]
+    kinematics = [
+        kinematics_of(trial, loads_or_walk) for loads_or_walk in (walks[0], replace(walks[1], positions=positions))
+    ]
     seen = observe(trial.skeleton, kinematics, MASS_KG, [Bandwidth(10.0)] * 2)
     assert [o.repeats for o in seen.pooled] == pytest.approx(seen.repeats.sum(axis=1))
-    for one, both in zip(seen.separate, seen.pooled, strict=True):
-        assert both.marker_sd == pytest.approx(np.sqrt(both.repeats) * one.marker_sd)
-        assert both.force_sd == pytest.approx(np.sqrt(both.repeats) * one.force_sd)
-        assert both.moment_sd == pytest.approx(np.sqrt(both.repeats) * one.moment_sd)
+    for alone, both in zip(seen.separate, seen.pooled, strict=True):
+        assert both.marker_sd == pytest.approx(np.sqrt(both.repeats) * alone.marker_sd)
+        assert both.force_sd == pytest.approx(np.sqrt(both.repeats) * alone.force_sd)
+        assert both.moment_sd == pytest.approx(np.sqrt(both.repeats) * alone.moment_sd)
         displaced = np.asarray(both.displacement_sd_m)
         # of two: 15 mm / sqrt 2 along one of three axes; inverse kinematics spreads some of it
         assert displaced[thigh] == pytest.approx(np.full(thigh.sum(), 0.015 / np.sqrt(6.0)), rel=0.35)
@@ -193,5 +195,5 @@ def test_the_process_is_as_dense_at_zero_frequency_as_the_errors(trial):
     seen, noise = observed(trial, study_noise(trial.markers, np.random.default_rng(0)))
     sd = np.array([noise.sd_m[label] for label in trial.skeleton.labels])
     frames = noise.correlation_s * trial.markers.rate_hz
-    own = np.square(seen.marker_sd) - girdle_variance(trial.skeleton, seen.q, np.ones(len(sd), dtype=bool))
-    assert (own / np.square(sd)).min() * seen.marker_frames == pytest.approx(frames, rel=0.2)
+    variance = np.square(seen.marker_sd) - girdle_variance(trial.skeleton, seen.q, np.ones(len(sd), dtype=bool))
+    assert (variance / np.square(sd)).min() * seen.marker_frames == pytest.approx(frames, rel=0.2)

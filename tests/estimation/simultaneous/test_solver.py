@@ -136,7 +136,7 @@ def test_markers_displaced_in_one_trial_are_found_and_hurt_nothing(trial, prior,
     second = replace(second, markers=second.markers + (turned @ moved_m[..., None])[..., 0])
 
     def estimate(sd_m):
-        trials = [replace(each, displacement_sd_m=np.where(thighs, sd_m, 0.0)) for each in (first, second)]
+        trials = [replace(seen_trial, displacement_sd_m=np.where(thighs, sd_m, 0.0)) for seen_trial in (first, second)]
         return estimate_simultaneous(trial.skeleton, prior, calibration, trials)
 
     free, stiff = estimate(0.01), estimate(0.0)
@@ -183,10 +183,10 @@ def test_without_forces_only_markers_count(trial, prior, calibration):
     seen = replace(observation(trial, noise_m=0.003), dynamic=dynamic)
     result = estimate_simultaneous(trial.skeleton, prior, calibration, [seen])
     np.testing.assert_allclose(result.bsp.table(), prior.mean.table(), rtol=0, atol=1e-6)
-    errors = [one for one in result.calibration if one.kind in ("plate", "synchronisation")]
-    assert {one.kind for one in errors} == {"plate", "synchronisation"}
-    for one in errors:
-        assert (one.value, one.sd) == (pytest.approx(0.0, abs=1e-9), pytest.approx(one.prior_sd))
+    errors = [entry for entry in result.calibration if entry.kind in ("plate", "synchronisation")]
+    assert {error.kind for error in errors} == {"plate", "synchronisation"}
+    for error in errors:
+        assert (error.value, error.sd) == (pytest.approx(0.0, abs=1e-9), pytest.approx(error.prior_sd))
     np.testing.assert_allclose(result.motions[0].q[6:-6], trial.motion.q[6:-6], atol=0.08)
 
 

@@ -74,8 +74,8 @@ def test_events_of_another_person_are_left_out():
         "LABELS": {"value": ["Foot Strike", "Foot Strike"]},
         "SUBJECTS": {"value": ["Ann", "Ben"]},
     }
-    (one,) = file_events({"EVENT": event}, ["LHEE", "Ben:LHEE"])
-    assert one.subject == "Ann"
+    (found_event,) = file_events({"EVENT": event}, ["LHEE", "Ben:LHEE"])
+    assert found_event.subject == "Ann"
 
 
 @pytest.mark.parametrize(
@@ -96,7 +96,7 @@ def test_events_of_another_person_are_known_by_the_subject_of_the_file(names, ex
         "SUBJECTS": {"value": ["Ann", "", "Ben"]},
     }
     found = file_events({"EVENT": event, "SUBJECTS": {"NAMES": {"value": names}}}, ["LHEE"])
-    assert [one.subject for one in found] == expected
+    assert [found_event.subject for found_event in found] == expected
 
 
 @pytest.mark.parametrize("times", [np.zeros(3), np.array(["a", "b"]), np.array([[0.0], [np.nan]])])
@@ -185,7 +185,10 @@ def test_events_have_the_subject_that_the_file_knows(parameters, prefix, expecte
 def test_events_of_other_people_state_nothing_of_this_one(subjects, others, added):
     section = section_of({"EVENT": {**EVENTS, "SUBJECTS": [subjects] * 2}})
     strike, off = GaitEvent(1.5, "r", "heel strike"), GaitEvent(2.1, "r", "toe off")
-    assert add_events(section, [EventToWrite(one, "motion") for one in (strike, off)], "Ann", others) == added
+    assert (
+        add_events(section, [EventToWrite(gait_event, "motion") for gait_event in (strike, off)], "Ann", others)
+        == added
+    )
 
 
 WHERE = Path("walk.c3d")
@@ -197,7 +200,7 @@ def read(group="PROCESSING", **values):
 
 
 def codes(data):
-    return [one.code for one in data.findings]
+    return [finding.code for finding in data.findings]
 
 
 @pytest.mark.parametrize("group", ["PROCESSING", "SUBJECT", "SUBJECTS"])
@@ -252,7 +255,10 @@ def test_children_and_heavy_adults_are_plausible(mass_kg, height_mm, width_mm):
 def test_what_cannot_be_true_is_not_used():
     data = read(Bodymass=700.0, Height=1700.0, RKneeWidth=1.0e6)
     assert (data.mass_kg, data.height_m, data.measurements) == (None, pytest.approx(1.7), {})
-    assert [one.evidence["quantity"].value for one in data.findings if one.code == "F125"] == ["mass", "RKneeWidth"]
+    assert [finding.evidence["quantity"].value for finding in data.findings if finding.code == "F125"] == [
+        "mass",
+        "RKneeWidth",
+    ]
     assert read(Bodymass=400.0, Height=1250.0).mass_kg is None, "a weight in newtons"
     assert read(Height=9000.0).height_m is None
 

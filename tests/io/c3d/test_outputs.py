@@ -34,14 +34,14 @@ def outputs(count, suffix="", seed=0):
     values = np.random.default_rng(seed).normal(0.0, 100.0, (4, count, 3))
     values[:, :2] = np.nan
     names = (("LHipAngles", "ANGLES"), ("LHipAnglesSD", "ANGLES"), ("LHipMoment", "MOMENTS"), ("LHJC", ""))
-    return [OutputPoint(label + suffix, kind, each) for (label, kind), each in zip(names, values, strict=True)]
+    return [OutputPoint(label + suffix, kind, value) for (label, kind), value in zip(names, values, strict=True)]
 
 
 def written(path, target, suffix="Kin", seed=0, prefix=""):
     """A copy of a file with outputs."""
     frames = frames_of(path)
-    own = {"VERSION": (["1"], None), "COM": (np.arange(6.0).reshape(2, 3), (3, 2))}
-    target.write_bytes(with_outputs(frames, outputs(len(frames.points), suffix, seed), prefix, UNITS, own))
+    parameters = {"VERSION": (["1"], None), "COM": (np.arange(6.0).reshape(2, 3), (3, 2))}
+    target.write_bytes(with_outputs(frames, outputs(len(frames.points), suffix, seed), prefix, UNITS, parameters))
     return target
 
 
@@ -66,9 +66,13 @@ def test_what_was_in_the_file_keeps_its_bytes(file_of, tmp_path, name):
     (old, words, points), (section, more, all_points) = sections(before), sections(after)
     np.testing.assert_array_equal(words[:, : 4 * points], more[:, : 4 * points])
     np.testing.assert_array_equal(words[:, 4 * points :], more[:, 4 * all_points :])
-    groups = {-one.group: one.name for one in old.records if one.group < 0}
-    kept = [one for one in old.records if one.group < 0 or groups[one.group] != "POINT" or one.name not in CHANGED]
-    assert kept == [one for one in section.records if one in kept]
+    groups = {-record.group: record.name for record in old.records if record.group < 0}
+    kept = [
+        record
+        for record in old.records
+        if record.group < 0 or groups[record.group] != "POINT" or record.name not in CHANGED
+    ]
+    assert kept == [record for record in section.records if record in kept]
     for kind in ("LABELS", "LABELS2"):
         had = old.get("POINT", kind) or []
         assert list(section.get("POINT", kind) or [])[: len(had)] == list(had)
@@ -84,31 +88,31 @@ def test_readers_find_them(file_of, tmp_path, name):
     file = ezc3d.c3d(str(new))
     with new.open("rb") as stream:
         other = np.array([points for _, points, _ in c3d.Reader(stream).read_frames()])
-    for k, one in enumerate(expected, start=-len(expected)):
-        np.testing.assert_allclose(file["data"]["points"][:3, k].T, one.values, rtol=1e-6)
-        np.testing.assert_allclose(other[2:, k, :3], one.values[2:], rtol=1e-6)
+    for k, added in enumerate(expected, start=-len(expected)):
+        np.testing.assert_allclose(file["data"]["points"][:3, k].T, added.values, rtol=1e-6)
+        np.testing.assert_allclose(other[2:, k, :3], added.values[2:], rtol=1e-6)
         assert (other[:2, k, 3] == -1.0).all()
     assert "LHipMomentKin" in file["parameters"]["POINT"]["MOMENTS"]["value"]
-    own = file["parameters"]["KINERTIA"]
-    assert own["LABELS"]["value"] == [one.label + "Kin" for one in outputs(3)]
-    np.testing.assert_array_equal(own["COM"]["value"], np.arange(6.0).reshape(2, 3).T)
+    parameters = file["parameters"]["KINERTIA"]
+    assert parameters["LABELS"]["value"] == [output.label + "Kin" for output in outputs(3)]
+    np.testing.assert_array_equal(parameters["COM"]["value"], np.arange(6.0).reshape(2, 3).T)
     before, after = read_c3d(path), read_c3d(new)
     assert before.markers.labels == after.markers.labels
     np.testing.assert_array_equal(before.markers.positions, after.markers.positions)
     if before.plates is not None:
         np.testing.assert_array_equal(before.plates.wrench, after.plates.wrench)
-    assert [one.message for one in before.findings] == [one.message for one in after.findings]
+    assert [finding.message for finding in before.findings] == [finding.message for finding in after.findings]
 
 
 def test_written_twice_they_are_replaced(file_of, tmp_path):
     path = file_of("synthetic/walk.c3d")
     once = written(path, tmp_path / "once.c3d", seed=1)
     again = written(written(path, tmp_path / "other.c3d", seed=0), tmp_path / "twice.c3d", seed=1)
-    (one, words, points), (two, more, as_many) = sections(once.read_bytes()), sections(again.read_bytes())
+    (once_read, words, points), (two, more, as_many) = sections(once.read_bytes()), sections(again.read_bytes())
     assert points == as_many
     np.testing.assert_array_equal(words, more)
-    assert one.get("POINT", "LABELS") == two.get("POINT", "LABELS")
-    assert one.get("POINT", "ANGLES") == two.get("POINT", "ANGLES")
+    assert once_read.get("POINT", "LABELS") == two.get("POINT", "LABELS")
+    assert once_read.get("POINT", "ANGLES") == two.get("POINT", "ANGLES")
 
 
 def person(path, integers=False, labels=9, parameters=None, prefix=""):
@@ -148,8 +152,13 @@ def test_measures_of_strides_are_added_where_a_file_states_none(tmp_path):
     assert twice["USED"]["value"] == [2]
     assert (twice["CONTEXTS"]["value"], twice["UNITS"]["value"]) == (["Left", "Right"], ["m/s", "m/s"])
     np.testing.assert_array_equal(twice["VALUES"]["value"], [1.25, 1.5])
-    own = {"NAMES": ["Cadence"], "DESCRIPTIONS": [""], "VALUES": np.array([120.0]), "USED": np.array([1], np.int16)}
-    clinic = person(tmp_path / "clinic.c3d", parameters={"ANALYSIS": own, "MANUFACTURER": {"EDITED": ["Mokka"]}})
+    analysis = {
+        "NAMES": ["Cadence"],
+        "DESCRIPTIONS": [""],
+        "VALUES": np.array([120.0]),
+        "USED": np.array([1], np.int16),
+    }
+    clinic = person(tmp_path / "clinic.c3d", parameters={"ANALYSIS": analysis, "MANUFACTURER": {"EDITED": ["Mokka"]}})
     kept = exported(clinic, tmp_path / "kept.c3d", speeds)
     assert (kept["ANALYSIS"]["NAMES"]["value"], kept["ANALYSIS"]["VALUES"]["value"]) == (["Cadence"], [120.0])
     assert kept["MANUFACTURER"]["EDITED"]["value"] == ["Mokka", f"Kinertia {VERSION}"]

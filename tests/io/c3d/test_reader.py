@@ -177,7 +177,9 @@ def test_labels(tmp_path):
     assert np.isnan(toe[3:6]).all()
     np.testing.assert_allclose(toe[0] * 1000, points[0, 2][[0, 2, 1]] * [1, 1, -1], atol=1e-3)
     counts = {
-        one.evidence["what"].value: one.evidence["count"].value for one in recording.findings if one.code == "F163"
+        finding.evidence["what"].value: finding.evidence["count"].value
+        for finding in recording.findings
+        if finding.code == "F163"
     }
     assert counts == {
         "label prefixes 'Ann:' (not those of Bob)": 5,
@@ -185,9 +187,12 @@ def test_labels(tmp_path):
         "unnamed points": 2,
     }
     assert only(recording.findings, "F113", label="RTOE", count=3).severity is Severity.INFO
-    missing = {one.evidence["written"].value: one for one in recording.findings if one.code == "F115"}
-    assert {what: one.evidence["count"].value for what, one in missing.items()} == {"0 0 0": 1, "-9999 -9999 -9999": 2}
-    assert {one.where.markers for one in missing.values()} == {("RTOE",)}
+    missing = {finding.evidence["written"].value: finding for finding in recording.findings if finding.code == "F115"}
+    assert {what: finding.evidence["count"].value for what, finding in missing.items()} == {
+        "0 0 0": 1,
+        "-9999 -9999 -9999": 2,
+    }
+    assert {finding.where.markers for finding in missing.values()} == {("RTOE",)}
 
 
 def test_of_repeated_labels_the_one_in_most_frames_is_kept(tmp_path):

@@ -87,8 +87,12 @@ def test_moments_in_another_unit_than_lengths_are_converted(tmp_path, unit, per_
     force = recording.plates.force[:, 0]
     np.testing.assert_allclose(recording.plates.moment[:, 0], np.cross((x, 0.0, -y), force), atol=1e-3)
     assert codes(recording.findings) == [*["F152"] * (per_unit != 1.0), "F133"]
-    for one in recording.findings[:-1]:
-        assert (one.where.plate, one.evidence["unit"].value, one.severity) == ("plate 1", unit, Severity.CORRECTED)
+    for finding in recording.findings[:-1]:
+        assert (finding.where.plate, finding.evidence["unit"].value, finding.severity) == (
+            "plate 1",
+            unit,
+            Severity.CORRECTED,
+        )
 
 
 @pytest.mark.parametrize(("unit", "per_unit"), [("Nm", 1e3), ("Nmm", 1.0), ("", 1.0)])

@@ -49,8 +49,8 @@ def path_of(file_of, tmp_path):
     def path(name):
         if name != WRITTEN:
             return file_of(name)
-        own = joint("GimbalJoint", "between", "/bodyset/pelvis", "leg", ("bend", "twist", "follow"))
-        text = model(custom_root() + own, coupler(LINEAR, "follow", "bend"))
+        gimbal = joint("GimbalJoint", "between", "/bodyset/pelvis", "leg", ("bend", "twist", "follow"))
+        text = model(custom_root() + gimbal, coupler(LINEAR, "follow", "bend"))
         held = "<default_value>0.4</default_value><locked>true</locked>"
         for before, after in (
             (coordinate("bend"), coordinate("bend").replace("-3 3", "0 2.0944")),
@@ -73,10 +73,10 @@ def test_coordinates_ranges_locks_and_couplings(path_of, name):
     ours, facts = read_osim(path_of(name)), FACTS[name]
     by_name = {c.name: c for c in ours.coordinates}
     assert len(by_name) == facts.count
-    assert {one: by_name[one].range for one in facts.ranges} == facts.ranges
-    assert all(by_name[one].locked for one in facts.locked)
+    assert {listed: by_name[listed].range for listed in facts.ranges} == facts.ranges
+    assert all(by_name[listed].locked for listed in facts.locked)
     assert facts.locked.items() <= dict(ours.skeleton.locked).items()
-    assert {one: by_name[one].default for one in facts.height} == facts.height
+    assert {listed: by_name[listed].default for listed in facts.height} == facts.height
     assert {c.dependent: c.independent for c in ours.couplings} == facts.couplings
     assert len(ours.skeleton.coordinates) == facts.free
     assert ours.skeleton.coordinates[:6] == facts.root

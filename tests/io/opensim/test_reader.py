@@ -111,8 +111,8 @@ JOINTS = {"PinJoint": 1, "SliderJoint": 1, "UniversalJoint": 2, "GimbalJoint": 3
 
 @pytest.mark.parametrize("kind", JOINTS)
 def test_a_joint_type(opensim, written, kind):
-    own = joint(kind, "between", "/bodyset/pelvis", "leg", "abc"[: JOINTS[kind]])
-    assert_opensim_agrees(*written(model(custom_root() + own)))
+    tested = joint(kind, "between", "/bodyset/pelvis", "leg", "abc"[: JOINTS[kind]])
+    assert_opensim_agrees(*written(model(custom_root() + tested)))
 
 
 def euler_rates_to_speeds(angles: np.ndarray) -> np.ndarray:
@@ -130,8 +130,8 @@ def test_joints_whose_speeds_are_not_the_rates_of_their_coordinates(opensim, wri
     from osim_oracle import OsimOracle
 
     free = joint("FreeJoint", "root", "/ground", "pelvis", ("tilt", "list", "turn", "tx", "ty", "tz"))
-    own = joint(kind, "between", "/bodyset/pelvis", "leg", "abc")
-    path, ours = written(model((free if root == "FreeJoint" else custom_root()) + own))
+    tested = joint(kind, "between", "/bodyset/pelvis", "leg", "abc")
+    path, ours = written(model((free if root == "FreeJoint" else custom_root()) + tested))
     oracle = OsimOracle(path, ours)
     motion = random_states(ours, N_STATES, 1.0)
     markers = ours.skeleton.marker_positions(ours.skeleton.pose(motion.q))
@@ -169,10 +169,10 @@ def test_a_coupled_coordinate(opensim, written, name):
 
 def test_locked_coordinates_stand_at_their_defaults(opensim, written):
     held = "<default_value>0.4</default_value><locked>true</locked>"
-    own = joint("GimbalJoint", "between", "/bodyset/pelvis", "leg", "abc").replace(
+    tested = joint("GimbalJoint", "between", "/bodyset/pelvis", "leg", "abc").replace(
         coordinate("b"), coordinate("b", held)
     )
-    path, ours = written(model(custom_root() + own))
+    path, ours = written(model(custom_root() + tested))
     assert ours.skeleton.locked == {"b": 0.4}
     assert_opensim_agrees(path, ours)
 
@@ -189,12 +189,12 @@ def test_a_massless_body(opensim, written, inertia):
 
 def test_frames_on_frames_and_markers_on_frames(opensim, written):
     outer = frame("outer", "/bodyset/pelvis", "0.1 0.2 0.3", "0.3 -0.2 0.5")
-    own = joint("PinJoint", "between", "../outer", "leg", "a").replace("<frames>", f"<frames>{outer}")
+    tested = joint("PinJoint", "between", "../outer", "leg", "a").replace("<frames>", f"<frames>{outer}")
     marker = (
         '<Marker name="F"><socket_parent_frame>/jointset/between/outer</socket_parent_frame>'
         "<location>0.1 0 0.2</location></Marker>"
     )
-    text = model(custom_root() + own)
+    text = model(custom_root() + tested)
     assert_opensim_agrees(
         *written(
             text.replace('<MarkerSet name="markerset"><objects>', f'<MarkerSet name="markerset"><objects>{marker}')
@@ -214,8 +214,8 @@ def test_a_root_on_turned_frames(opensim, written):
             + [(f"t{name}", axis, LINEAR) for name, axis in zip("xyz", ("1 0 0", "0 1 0", "0 0 1"), strict=True)]
         ),
     )
-    own = joint("PinJoint", "between", "/bodyset/pelvis", "leg", "a")
-    assert_opensim_agrees(*written(model(turned + own)))
+    tested = joint("PinJoint", "between", "/bodyset/pelvis", "leg", "a")
+    assert_opensim_agrees(*written(model(turned + tested)))
 
 
 # --- format 3

@@ -141,8 +141,8 @@ def test_markers_and_joints_that_moved(opensim, file_of, tmp_path, name):
 
 def test_a_marker_on_a_turned_frame_and_a_joint_of_format_3(tmp_path):
     outer = frame("outer", "/bodyset/pelvis", "0.1 0.2 0.3", "0.3 -0.2 0.5")
-    own = PIN.replace("<frames>", f"<frames>{outer}")
-    text = model(custom_root() + own).replace(
+    pin = PIN.replace("<frames>", f"<frames>{outer}")
+    text = model(custom_root() + pin).replace(
         '<Marker name="P1"><socket_parent_frame>/bodyset/pelvis',
         '<Marker name="P1"><socket_parent_frame>/jointset/between/outer',
     )
@@ -193,8 +193,8 @@ def test_bodies_are_welded_to_those_of_the_file(opensim, file_of, tmp_path):
         changes = write_osim(path, ours, wanted, welds={"bag": parent})
         assert list(changes.component) == ["bag"]
         again = read_osim(path)
-        joint = next(one for one in again.skeleton.joints if one.child == "bag")
+        joint = next(candidate for candidate in again.skeleton.joints if candidate.child == "bag")
         assert (joint.parent, joint.axes) == (parent, ())
         np.testing.assert_allclose(opensim_table(opensim, path)["bag"], row[0])
         assert again.skeleton.coordinates == ours.skeleton.coordinates
-        assert all(".vtp" in one for one in warnings_of(opensim, path, tmp_path / "log.txt"))
+        assert all(".vtp" in line for line in warnings_of(opensim, path, tmp_path / "log.txt"))

@@ -39,7 +39,7 @@ def test_the_home_folder_is_refused_at_once(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "own"),
+    ("name", "text", "is_results"),
     [
         ("fit.json", json.dumps({"kinertia": "0.1.0"}), True),
         ("table1.json", json.dumps({"kinertia": "0.1.0"}), True),
@@ -51,10 +51,10 @@ def test_the_home_folder_is_refused_at_once(tmp_path, monkeypatch):
         ("thesis.tex", "kinertia", False),
     ],
 )
-def test_folders_that_hold_something(tmp_path, name, text, own):
+def test_folders_that_hold_something(tmp_path, name, text, is_results):
     (tmp_path / name).write_text(text)
     (tmp_path / "other.csv").write_text("1")
-    if own:
+    if is_results:
         expect_own_folder(tmp_path)
         return
     with pytest.raises(FileError, match=f"not results of Kinertia .*{name}.* folder, or so$"):

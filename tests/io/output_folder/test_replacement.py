@@ -68,7 +68,7 @@ def test_a_file_system_without_links_and_exchange(results, monkeypatch):
         raise OSError(1, "Operation not permitted")
 
     monkeypatch.setattr("kinertia.io.output_folder.os.link", no_link)
-    monkeypatch.setattr("kinertia.io.output_folder._exchanged", lambda one, other: False)
+    monkeypatch.setattr("kinertia.io.output_folder._exchanged", lambda first, other: False)
     (results / "mine.txt").write_text("mine", encoding="utf-8")
     _write_again(results)
     assert texts_of(results) == {**NEW, "mine.txt": "mine"}
@@ -141,7 +141,7 @@ def _busy(monkeypatch, step):
         rename(source, target)
 
     monkeypatch.setattr("kinertia.io.output_folder.os.rename", renamed)
-    monkeypatch.setattr("kinertia.io.output_folder._exchanged", lambda one, other: False)
+    monkeypatch.setattr("kinertia.io.output_folder._exchanged", lambda first, other: False)
 
 
 @pytest.mark.parametrize("step", [0, 1])

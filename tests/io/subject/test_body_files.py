@@ -17,9 +17,9 @@ def test_the_sheet_has_every_measure_once_and_the_quick_ones_first():
     header, *rows = measures_sheet().splitlines()
     assert header == ",".join(COLUMNS)
     names = [row.split(",")[0] for row in rows]
-    assert sorted(names) == sorted(one.name for one in measures())
+    assert sorted(names) == sorted(measure.name for measure in measures())
     assert [row.endswith(",yes") for row in rows] == sorted((row.endswith(",yes") for row in rows), reverse=True)
-    assert len({key for one in measures() for key in one.keys}) == 95
+    assert len({key for measure in measures() for key in measure.keys}) == 95
     assert usual_build().median_m.shape == (len(names),)
     assert len(girths_with_widths()) == 11
 

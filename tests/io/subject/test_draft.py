@@ -263,8 +263,8 @@ def test_the_only_model_takes_the_place_of_a_static_trial_that_no_name_tells(tmp
 def test_models_nearby_are_commented_lines(tmp_path, c3d_lab, place):
     """As AddBiomechanics and OpenCap place them."""
     folder = tmp_path / "MarkerData"
-    for one in (folder, tmp_path / place, tmp_path / "Ben" / "Model"):
-        one.mkdir(parents=True)
+    for place_of_model in (folder, tmp_path / place, tmp_path / "Ben" / "Model"):
+        place_of_model.mkdir(parents=True)
     shutil.copyfile(c3d_lab / "static.c3d", folder / "walk.c3d")
     (tmp_path / place / "final.osim").touch()
     (tmp_path / "Ben" / "Model" / "bens.osim").touch()

@@ -75,7 +75,7 @@ def test_stated_feet_reach_the_recording(folder):
     line = 'feet = [{ plate = "a_force", foot = "left", window_s = [0.1, 0.8] }, { plate = "b_force", foot = "none" }]'
     wanted = subject(folder, trial=line)
     stated = read_trial(wanted, wanted.trials[0]).recording.stated_contacts
-    assert [(one.plate, one.foot, one.span_s) for one in stated] == [
+    assert [(contact.plate, contact.foot, contact.span_s) for contact in stated] == [
         ("a_force", 1, (0.1, 0.8)),
         ("b_force", None, (-np.inf, np.inf)),
     ]

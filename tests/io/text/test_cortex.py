@@ -91,7 +91,7 @@ def test_forces_that_are_vertical_along_another_axis_than_the_markers(write):
 def test_a_header_that_counts_wrong_is_a_finding(write):
     _, findings = read_cortex_forces(write(rows(), plates=3, samples=400), ground_rotation("+Z"))
     assert codes(findings) == ["F111", "F111"]
-    assert [one.evidence["found"].value for one in findings] == [2, 300]
+    assert [finding.evidence["found"].value for finding in findings] == [2, 300]
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,8 @@ def test_a_walk_comes_back(recording_of, tmp_path, monkeypatch, kind, name):
     walk = recording_of(name)
     corners = np.stack([plate @ lab_files.LAB for plate in walk.plates.corners])
     x, y = (
-        corners[:, one].mean(axis=1) - corners[:, two].mean(axis=1) for one, two in (([0, 3], [1, 2]), ([0, 1], [2, 3]))
+        corners[:, front].mean(axis=1) - corners[:, two].mean(axis=1)
+        for front, two in (([0, 3], [1, 2]), ([0, 1], [2, 3]))
     )
     axes = np.stack([x, y, np.cross(x, y)], axis=1)
     monkeypatch.setattr(lab_files, "CORNERS_M", corners)

@@ -19,7 +19,7 @@ PATH = Path("walk.mot")
 def test_rounded_times_are_restored(rate_hz, decimals):
     true = np.arange(600) / rate_hz
     times, findings = uniform_times(PATH, true.round(decimals))
-    assert [one.code for one in findings] == ["T102"]
+    assert [finding.code for finding in findings] == ["T102"]
     assert np.diff(times) == pytest.approx(1.0 / rate_hz, rel=1e-3)
 
 
@@ -57,9 +57,9 @@ def two_people(path, first, second, load_n=600.0):
 def test_the_trial_is_that_of_the_person_on_the_plates(tmp_path, first, second, subject, other):
     path, points = two_people(tmp_path / "x.c3d", first, second)
     recording = read_c3d(path)
-    own = recording.markers.select([f"M{k}" for k in range(9)]).positions
+    measured = recording.markers.select([f"M{k}" for k in range(9)]).positions
     columns = slice(0, 9) if subject == "Anna" else slice(9, 18)
-    np.testing.assert_allclose(own[..., 1], points[:, columns, 2] / 1000, atol=1e-6)
+    np.testing.assert_allclose(measured[..., 1], points[:, columns, 2] / 1000, atol=1e-6)
     only(recording.findings, "F163", count=9, what=f"'{subject}:' (not those of {other})")
     only(recording.findings, "F162", person=subject, people="Anna, Ben")
 

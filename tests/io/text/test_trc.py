@@ -144,8 +144,8 @@ def test_missing_markers(write, cells):
     assert np.isnan(markers.positions[:, 1]).all()
     np.testing.assert_allclose(markers.positions[0, 0], [0.004, 0.005, 0.006])
     assert codes(recording.findings) == ["F115"] * cells.endswith("0.0")
-    for one in recording.findings:
-        assert (one.evidence["count"].value, one.where.markers) == (3, ("L Heel",))
+    for finding in recording.findings:
+        assert (finding.evidence["count"].value, finding.where.markers) == (3, ("L Heel",))
 
 
 def test_a_header_that_miscounts_its_frames_is_a_finding(write):

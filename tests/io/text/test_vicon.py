@@ -37,7 +37,7 @@ def test_a_trial_comes_back_whatever_axes_its_forces_are_in(tmp_path, walk, turn
     np.testing.assert_allclose(recording.plates.moment, walk.plates.moment, atol=1e-3)
     rotated = [] if np.array_equal(turn, np.eye(3)) else ["F154", "F154"]
     assert codes(recording.findings) == ["F163", *rotated, "F133"]
-    assert [one.where.plate for one in recording.findings[1:-1]] == list(recording.plates.names)[: len(rotated)]
+    assert [finding.where.plate for finding in recording.findings[1:-1]] == list(recording.plates.names)[: len(rotated)]
 
 
 def test_an_empty_cell_is_a_missing_marker(tmp_path, walk):
@@ -116,6 +116,6 @@ def test_moments_that_contradict_the_centre_of_pressure_are_not_used(tmp_path, w
     path = write_nexus(tmp_path / "walk.csv", walk)
     path.write_text(path.read_text().replace("Mx,My,Mz", "Mx,Mz,My"))
     recording = read_recording(path)
-    found = [one for one in recording.findings if one.code == "F153"]
-    assert [one.where.plate for one in found] == list(recording.plates.names)
-    assert all(one.evidence["misses"].value > 0.05 for one in found)
+    found = [finding for finding in recording.findings if finding.code == "F153"]
+    assert [finding.where.plate for finding in found] == list(recording.plates.names)
+    assert all(finding.evidence["misses"].value > 0.05 for finding in found)

@@ -31,11 +31,11 @@ def moved(fit, segment, column, sds):
 
 def test_what_changed_beyond_its_error_bars_is_found(fit):
     other = moved(moved(fit, "thigh_r", 0, 2.1), "shank_l", 3, -1.8)
-    compared = {(one.segment, one.parameter): one for one in differences(fit, other)}
+    compared = {(difference.segment, difference.parameter): difference for difference in differences(fit, other)}
     assert len(compared) == 120
-    assert [key for key, one in compared.items() if one.changed] == [("thigh_r", "mass")]
-    one = compared["shank_l", "com_z"]
-    assert one.change / one.sd == pytest.approx(-1.8)
+    assert [key for key, difference in compared.items() if difference.changed] == [("thigh_r", "mass")]
+    centre = compared["shank_l", "com_z"]
+    assert centre.change / centre.sd == pytest.approx(-1.8)
     columns = pd.DataFrame(comparison_columns({"before": fit, "after": other}))
     assert columns[columns.changed].segment.tolist() == ["thigh_r"]
     shown = Elements(render_comparison({"before": fit, "after": other})).text
@@ -44,7 +44,7 @@ def test_what_changed_beyond_its_error_bars_is_found(fit):
 
 
 def test_without_error_bars_nothing_is_called_changed(fit, two_level):
-    assert {one.changed for one in differences(fit, two_level)} == {None}
+    assert {difference.changed for difference in differences(fit, two_level)} == {None}
     assert set(comparison_columns({"a": fit, "b": two_level})["changed"]) == {None}
     page = render_comparison({"a": fit, "b": two_level})
     assert '<p class="headline">No error bars, differences only.</p>' in page, "of no severity"
@@ -65,9 +65,9 @@ def test_error_bars_are_explained_where_there_are_any(fit, two_level):
 
 @pytest.mark.parametrize("findings", [FAULT_FREE, FAULTY, UNUSABLE])
 def test_a_fit_has_the_verdict_that_its_report_has(fit, findings):
-    one = replace(fit, findings=findings)
-    page = render_comparison({"one": one, "two": one})
-    assert re.findall(r'<td class="level">(.*?)</td>', page) == [one.overview.verdict] * 2
+    judged = replace(fit, findings=findings)
+    page = render_comparison({"one": judged, "two": judged})
+    assert re.findall(r'<td class="level">(.*?)</td>', page) == [judged.overview.verdict] * 2
 
 
 @pytest.mark.slow
@@ -78,25 +78,26 @@ def test_two_persons_and_two_models_are_pointed_out(fit, fit_with_model):
     heavy = replace(fit, subject=fit.subject.model_copy(update={"mass_kg": 90.0}))
     (said,) = remarks({"a": fit, "b": heavy})
     assert said == "a has 72.6 kg, b 90.0 kg: is it the same person?"
-    own = load_fit(fit_with_model("gait2354", True))
-    said = " ".join(remarks({"a": fit, "b": own}))
+    on_model = load_fit(fit_with_model("gait2354", True))
+    said = " ".join(remarks({"a": fit, "b": on_model}))
     assert "different models" in said
     assert "do not share these segments" in said
     assert "knee_angle of b has the opposite sign: its moments are drawn with the sign of a" in said
-    compared = differences(fit, own)  # of those that both have
-    assert {(one.segment, one.same, one.changed) for one in compared} == {
+    compared = differences(fit, on_model)  # of those that both have
+    assert {(difference.segment, difference.same, difference.changed) for difference in compared} == {
         ("pelvis", False, None),
         ("torso", False, None),
     }
     assert (
         "No segment is the same in both models, differences only."
-        in Elements(render_comparison({"a": fit, "b": own})).text
+        in Elements(render_comparison({"a": fit, "b": on_model})).text
     )
     moments = {
-        trace["name"]: trace["y"] for trace in panel_of(moments_figure({"a": fit, "b": own}), "Right knee moment")
+        trace["name"]: trace["y"] for trace in panel_of(moments_figure({"a": fit, "b": on_model}), "Right knee moment")
     }
     theirs = {
-        trace["name"]: trace["y"] for trace in panel_of(moments_figure({"b": own}), "Right knee moment, extension +")
+        trace["name"]: trace["y"]
+        for trace in panel_of(moments_figure({"b": on_model}), "Right knee moment, extension +")
     }
     np.testing.assert_allclose(moments["b"], -np.asarray(theirs["b"]), rtol=1e-5)
 
@@ -104,7 +105,7 @@ def test_two_persons_and_two_models_are_pointed_out(fit, fit_with_model):
 def panel_of(figure, title):
     """The traces of the panel whose title begins so."""
     titles = [note["text"] for note in figure.layout["annotations"]]
-    panel = next(k for k, one in enumerate(titles) if one.startswith(f"<b>{title}"))
+    panel = next(k for k, text in enumerate(titles) if text.startswith(f"<b>{title}"))
     return [trace for trace in figure.data if trace["xaxis"] == (f"x{panel + 1}" if panel else "x")]
 
 

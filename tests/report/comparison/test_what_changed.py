@@ -26,8 +26,8 @@ def twice(fit):
 
 
 def doubt(fit, *findings):
-    one = replace(fit, findings=findings)
-    return instrument_doubts((one, one.trials[:1]), (one, one.trials[1:])).get("r", "")
+    doubted = replace(fit, findings=findings)
+    return instrument_doubts((doubted, doubted.trials[:1]), (doubted, doubted.trials[1:])).get("r", "")
 
 
 def test_an_error_of_one_condition_is_none_of_both(twice):
@@ -58,5 +58,5 @@ def test_sessions_have_errors_of_their_own(twice):
 def test_a_foot_beside_its_plate_leaves_the_other_leg(twice):
     where = Where(trial="first", plate="plate 1")
     beside = finding("P282", where, foot=Quantity("right"), overhang_m=Quantity(0.05, "m"))
-    one = replace(twice, findings=(beside,))
-    assert set(instrument_doubts((one, one.trials[:1]), (one, one.trials[1:]))) == {"r"}
+    doubted = replace(twice, findings=(beside,))
+    assert set(instrument_doubts((doubted, doubted.trials[:1]), (doubted, doubted.trials[1:]))) == {"r"}

@@ -40,14 +40,14 @@ def expect_outputs(path, fit, suffix=""):
     outputs = outputs_of(fit, trial, usual_convention(fit))
     assert len(outputs) == 28
     # what a hinge transmits has a standard deviation, too, and a leg is known longer than both are
-    knee = next(one for one in outputs if one.name == "RKneeMoment")
+    knee = next(output for output in outputs if output.name == "RKneeMoment")
     assert np.isfinite(knee.sd).sum() == np.isfinite(knee.values).sum() > 3 * len(trial.time)
-    for one in outputs:
-        np.testing.assert_allclose(points[one.name + suffix][:, at].T, one.values, atol=1e-4)
-        assert np.isnan(points[one.name + suffix][:, outside]).all()
-        if np.isfinite(one.sd).any():
+    for output in outputs:
+        np.testing.assert_allclose(points[output.name + suffix][:, at].T, output.values, atol=1e-4)
+        assert np.isnan(points[output.name + suffix][:, outside]).all()
+        if np.isfinite(output.sd).any():
             np.testing.assert_allclose(
-                points[one.name + suffix + "SD"][:, at].T, np.nan_to_num(one.sd, nan=-1.0), atol=1e-4
+                points[output.name + suffix + "SD"][:, at].T, np.nan_to_num(output.sd, nan=-1.0), atol=1e-4
             )
     return points, at
 
@@ -63,10 +63,10 @@ def test_a_walk_in_trc_gets_a_new_file(fit, demo_run, tmp_path):
     apart = np.linalg.norm(points["LHJC"] - points["RHJC"], axis=0)[at]
     assert 100.0 < apart.mean() < 250.0
     assert np.ptp(apart) < 1e-3
-    own = ezc3d.c3d(str(path))["parameters"]["KINERTIA"]
-    masses = dict(zip(own["SEGMENTS"]["value"], own["MASS"]["value"], strict=True))
+    parameters = ezc3d.c3d(str(path))["parameters"]["KINERTIA"]
+    masses = dict(zip(parameters["SEGMENTS"]["value"], parameters["MASS"]["value"], strict=True))
     assert masses == pytest.approx(dict(zip(fit.estimate.segments, fit.estimate.mass_kg, strict=True)), rel=1e-6)
-    assert len(own["SHA256"]["value"]) == len(own["FILES"]["value"]) > 1
+    assert len(parameters["SHA256"]["value"]) == len(parameters["FILES"]["value"]) > 1
     written = ezc3d.c3d(str(path))["parameters"]["ANALYSIS"]
     speeds = fit.spatiotemporal.groupby("side").speed_m_s.mean()
     for side, name, value in zip(*(written[key]["value"] for key in ("CONTEXTS", "NAMES", "VALUES")), strict=True):
@@ -119,10 +119,12 @@ def test_results_have_the_units_that_the_file_states(fit, demo_run, tmp_path):
     header = file["header"]["points"]
     at = (trial.joint_curves.time * header["frame_rate"]).round().astype(int) - header["first_frame"]
     factors = {"ANGLES": np.pi / 180.0, "MOMENTS": 1e3, "FORCES": 1.0, "POWERS": 1e3}
-    for one in outputs_of(fit, trial, "isb"):
-        np.testing.assert_allclose(points[one.name][:, at].T, factors[one.kind] * one.values, rtol=1e-5, atol=1e-5)
-    own = file["parameters"]["KINERTIA"]["UNITS"]["value"]
-    assert own == ["ANGLES rad", "FORCES N/kg", "MOMENTS N-mm/kg", "POWERS mW/kg"]
+    for output in outputs_of(fit, trial, "isb"):
+        np.testing.assert_allclose(
+            points[output.name][:, at].T, factors[output.kind] * output.values, rtol=1e-5, atol=1e-5
+        )
+    units = file["parameters"]["KINERTIA"]["UNITS"]["value"]
+    assert units == ["ANGLES rad", "FORCES N/kg", "MOMENTS N-mm/kg", "POWERS mW/kg"]
     assert file["parameters"]["POINT"]["FORCE_UNITS"]["value"] == ["N"]
 
 
@@ -148,10 +150,10 @@ def test_the_prefix_is_the_persons(prefix):
 
 def test_the_prefix_is_not_that_of_a_second_person():
     """The reader leaves the others' prefixes in place, so that as many labels are found without Anna's."""
-    own, other = ("LASI", "RASI", "LKNE"), ("Ben:LASI", "Ben:RASI", "Ben:LKNE")
-    markers = SimpleNamespace(labels=(*own, *other))
+    person, other = ("LASI", "RASI", "LKNE"), ("Ben:LASI", "Ben:RASI", "Ben:LKNE")
+    markers = SimpleNamespace(labels=(*person, *other))
     trial = SimpleNamespace(kinematics=SimpleNamespace(trial=SimpleNamespace(markers=markers)))
-    labels = (*(f"Anna:{label}" for label in own), *other)
+    labels = (*(f"Anna:{label}" for label in person), *other)
     assert prefix_of(SimpleNamespace(labels=labels), trial) == "Anna:"
 
 
@@ -238,7 +240,7 @@ def test_measured_files_come_back_with_vicons_signs(fit_of, tmp_path, name):
                     agree = np.corrcoef(theirs, ours)[0, 1]
                     if kind == "Moment" and joint != "Ankle" and agree < 0.9:
                         # their centres are up to 3.5 cm elsewhere, and their moments of inertia three times ours
-                        own = points[side + {"Hip": "FEP", "Knee": "FEO"}[joint]][:, at].T
+                        extension_axis = points[side + {"Hip": "FEP", "Knee": "FEO"}[joint]][:, at].T
                         more = more_inertia(points, side, joint, at, rate_hz)
-                        agree = np.corrcoef(theirs, extension_about(fit, joint, side, path, own, more))[0, 1]
+                        agree = np.corrcoef(theirs, extension_about(fit, joint, side, path, extension_axis, more))[0, 1]
                     assert agree > 0.9, (side, joint, kind, agree)

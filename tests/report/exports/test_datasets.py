@@ -18,10 +18,10 @@ def test_curves_over_the_gait_cycle_are_those_of_cycles(fit, kind):
     cycles = fit.cycles()
     for joint in dataset.joint.values:
         name = str(joint) if kind == "force" else f"{joint}_{kind}"
-        for (trial, side, stride), own in cycles[cycles.quantity == name].groupby(["trial", "side", "stride"]):
+        for (trial, side, stride), rows in cycles[cycles.quantity == name].groupby(["trial", "side", "stride"]):
             place = {"trial": trial, "side": side, "stride": stride, "joint": joint}
-            np.testing.assert_array_equal(dataset.value.sel(place), own.value)
-            np.testing.assert_array_equal(dataset.sd.sel(place), own.sd)
+            np.testing.assert_array_equal(dataset.value.sel(place), rows.value)
+            np.testing.assert_array_equal(dataset.sd.sel(place), rows.sd)
     assert dataset.value.attrs["units"] == {"angle": "deg", "power": "W/kg", "force": "% body weight"}.get(
         kind, "N m/kg"
     )
@@ -66,8 +66,8 @@ def test_trials_stand_side_by_side(short_fit):
     dataset = short_fit.to_xarray("angle", over="time")
     assert dataset.trial.values.tolist() == ["early", "late"]
     for trial in short_fit.trials:
-        own = dataset.value.sel(trial=trial.name, joint="hip_flexion_l").dropna("time")
-        np.testing.assert_allclose(own, np.degrees(trial.coordinates.hip_flexion_l))
+        curve = dataset.value.sel(trial=trial.name, joint="hip_flexion_l").dropna("time")
+        np.testing.assert_allclose(curve, np.degrees(trial.coordinates.hip_flexion_l))
     assert dataset.sd.isnull().all()
 
 

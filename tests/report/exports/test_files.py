@@ -62,14 +62,14 @@ def test_fit_json_keeps_its_contract(saved):
         "literature": fit.literature.mass_kg.sum(),
         "estimate": fit.estimate.mass_kg.sum(),
     }
-    assert fit_summary["findings"] == [one.to_dict() for one in fit.findings]
+    assert fit_summary["findings"] == [finding.to_dict() for finding in fit.findings]
     assert (fit_summary["verdict"], fit_summary["rules_run"]) == (fit.overview.verdict, fit.rules)
-    assert [one["output"] for one in fit_summary["suitability"]] == [
-        one.output for one in suitability(fit, fit.findings)
+    assert [rating["output"] for rating in fit_summary["suitability"]] == [
+        rating.output for rating in suitability(fit, fit.findings)
     ]
     with pytest.warns(DeprecationWarning, match="Fit.overview.table"):
         assert fit_summary["warnings"] == list(fit.warnings)
-    corrections = [one.line() for one in fit.overview.open if one.severity is Severity.CORRECTED]
+    corrections = [finding.line() for finding in fit.overview.open if finding.severity is Severity.CORRECTED]
     assert fit_summary["corrections"] == corrections
     assert fit_summary["notes"] == list(fit.notes)
     assert fit_summary["converged"] == fit.converged

@@ -27,8 +27,8 @@ def test_the_same_report_to_the_letter(fit, loaded):
 
 
 def test_the_same_files_to_the_byte(fit, loaded, tmp_path):
-    for one, name in ((fit, "first"), (loaded, "second")):
-        save_fit(one, tmp_path / name, Provenance("kinertia fit x", {"x": "0"}))
+    for saved, name in ((fit, "first"), (loaded, "second")):
+        save_fit(saved, tmp_path / name, Provenance("kinertia fit x", {"x": "0"}))
     names = {path.relative_to(tmp_path / "first") for path in (tmp_path / "first").rglob("*") if path.is_file()}
     assert len(names) >= 12
     for name in names:

@@ -15,7 +15,7 @@ LEGS = ("hip_flexion", "hip_adduction", "hip_rotation", "knee_angle", "ankle_ang
 
 
 def titles(skeleton):
-    return {one.name: one.title for one in panels_of(skeleton)}
+    return {coordinate.name: coordinate.title for coordinate in panels_of(skeleton)}
 
 
 def turned_round(skeleton, *coordinates):
@@ -89,8 +89,8 @@ def panel(figure, title):
     """The thick curve of each side in the panel with this title, which is there once."""
     (k,) = [k for k, note in enumerate(figure.layout["annotations"]) if note["text"].startswith(f"<b>{title} +")]
     axis = f"x{k + 1 if k else ''}"
-    lines = [one for one in figure.data if one["xaxis"] == axis and one.get("line", {}).get("width") == 2.2]
-    return {one["name"].partition(",")[0]: np.asarray(one["y"], dtype=float) for one in lines}
+    lines = [trace for trace in figure.data if trace["xaxis"] == axis and trace.get("line", {}).get("width") == 2.2]
+    return {line["name"].partition(",")[0]: np.asarray(line["y"], dtype=float) for line in lines}
 
 
 @pytest.mark.parametrize("convention", CONVENTIONS)

@@ -13,7 +13,7 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 
 def test_every_level_is_shown_once_with_its_words_apart_from_others():
-    assert {one.level for one in measures()} <= set(LEVELS)
+    assert {measure.level for measure in measures()} <= set(LEVELS)
     root = ElementTree.fromstring(measures_picture())
     labels = ["".join(text.itertext()) for text in root.iter(f"{SVG}text")]
     assert all(labels.count(f"{name} {words}") == 1 for name, words in LEVELS.items())

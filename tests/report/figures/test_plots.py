@@ -33,11 +33,11 @@ def test_curves_are_those_of_the_report(fit):
     lines = {(to_hex(line.get_color()), line.get_linestyle()): line for line in whole}
     for side, colour in (("right", "#0072b2"), ("left", "#d55e00")):
         for name, dash in ((f"{side}, one stride", "-"), (f"{side}, literature values", ":")):
-            (trace,) = [one for one in traces if one["name"] == name]
+            (trace,) = [drawn for drawn in traces if drawn["name"] == name]
             line = lines[colour, dash]
             np.testing.assert_array_equal(line.get_xdata(), np.arange(101))
             np.testing.assert_array_equal(line.get_ydata(), trace["y"])
-    (band,) = [one for one in traces if one["name"] == "right, 95 % of the estimate"]
+    (band,) = [drawn for drawn in traces if drawn["name"] == "right, 95 % of the estimate"]
     outline = next(patch for patch in axes.patches if to_hex(patch.get_facecolor()) == "#0072b2").get_xy()
     y = np.asarray(band["y"], dtype=float)
     assert set(np.round(outline[:, 1], 6)) == set(np.round(y[np.isfinite(y)], 6))
@@ -52,8 +52,8 @@ def test_no_title_is_broken_inside_its_unit(fit):
 
 def test_error_bars_are_those_of_the_report(fit):
     axes, traces = panel(change_figure(fit), "CoM forward (mm)")
-    (estimate,) = [one for one in traces if one["name"] == "estimate, 95 %"]
-    bars = next(one for one in axes.collections if to_hex(one.get_color()[0]) == "#0072b2")
+    (estimate,) = [trace for trace in traces if trace["name"] == "estimate, 95 %"]
+    bars = next(collection for collection in axes.collections if to_hex(collection.get_color()[0]) == "#0072b2")
     for segment, x, y, half in zip(
         bars.get_segments(), estimate["x"], estimate["y"], estimate["error_x"]["array"], strict=True
     ):
@@ -75,11 +75,11 @@ def test_a_figure_is_a_file(fit, tmp_path, ending, begin):
 
 @pytest.mark.slow
 def test_every_figure_is_drawn_with_and_without_error_bars(fit, two_level):
-    for one in (fit, two_level):
+    for result in (fit, two_level):
         for name in FOR_PAPERS:
-            if name == "departures" and one is two_level:
+            if name == "departures" and result is two_level:
                 continue
-            drawn = getattr(FitFigures(one, drawing), name)()
+            drawn = getattr(FitFigures(result, drawing), name)()
             assert all(axes.has_data() for axes in drawn.axes), name
             drawn.draw_without_rendering()
 
@@ -99,7 +99,9 @@ def test_without_strides_moments_are_over_time(fit, tmp_path):
     still = replace(fit, trials=(standing,))
     drawn = FitFigures(still, drawing).moments()
     assert drawn.axes[0].get_xlabel() == "time (s)"
-    assert any(isinstance(one, FillBetweenPolyCollection) for one in drawn.axes[0].collections), "95 % bands"
+    assert any(isinstance(collection, FillBetweenPolyCollection) for collection in drawn.axes[0].collections), (
+        "95 % bands"
+    )
     for name in ("moments", "angles"):
         (legend,) = getattr(FitFigures(still, drawing), name)().legends
         assert legend.get_title().get_text() == f"Trial {standing.name}"

@@ -49,37 +49,37 @@ def drawn(figure, title, side):
     """The thick curve of a side in the panel with this title, which is there once."""
     (k,) = [k for k, note in enumerate(figure.layout["annotations"]) if note["text"].startswith(f"<b>{title}")]
     axis = f"x{k + 1 if k else ''}"
-    lines = [one for one in figure.data if one["xaxis"] == axis and one["name"].startswith(f"{side},")]
-    (line,) = [one for one in lines if one.get("line", {}).get("width") in (2, 2.2)]
+    lines = [trace for trace in figure.data if trace["xaxis"] == axis and trace["name"].startswith(f"{side},")]
+    (line,) = [drawn_line for drawn_line in lines if drawn_line.get("line", {}).get("width") in (2, 2.2)]
     return np.asarray(line["y"], dtype=float)
 
 
-def correlation(one, other):
-    both = np.isfinite(one) & np.isfinite(other)
+def correlation(curve, other):
+    both = np.isfinite(curve) & np.isfinite(other)
     assert both.sum() > 40
-    return np.corrcoef(one[both], other[both])[0, 1]
+    return np.corrcoef(curve[both], other[both])[0, 1]
 
 
 @pytest.mark.parametrize("side", ["right", "left"])
 @pytest.mark.parametrize(("joint", "row"), MOMENTS)
 @pytest.mark.parametrize(("convention", "sign"), [("clinical", 1.0), ("isb", -1.0)])
 def test_joint_moments(walk, vicons, joint, row, side, convention, sign):
-    time, of = vicons
+    time, vicon_curve = vicons
     (trial,) = walk.trials
     curve = trial.joint_curves
     figure = joint_moment_figure(trial, walk.mass_kg, convention, len(curve.time))
     ours = drawn(figure, f"{MOMENTS[joint, row][convention == 'isb']} +", side)
-    theirs = np.interp(curve.time, time, of(f"{side[0].upper()}{joint}Moment", row))
+    theirs = np.interp(curve.time, time, vicon_curve(f"{side[0].upper()}{joint}Moment", row))
     assert sign * correlation(ours, np.where(theirs == 0.0, np.nan, theirs)) > ALIKE
 
 
 @pytest.mark.parametrize("quantity", CLINICAL_ANGLES)
 @pytest.mark.parametrize("convention", ["clinical", "isb"])
 def test_the_nine_angles(walk, vicons, quantity, convention):
-    time, of = vicons
+    time, vicon_curve = vicons
     (trial,) = walk.trials
     figure = cycle_figures(under(walk, convention))["clinical"]
-    one = CLINICAL_ANGLES[quantity]
+    angle = CLINICAL_ANGLES[quantity]
     k = list(CLINICAL_ANGLES).index(quantity)
     title = figure.layout["annotations"][k]["text"].removeprefix("<b>").partition(" +")[0]
     sign = -1.0 if convention == "isb" and quantity in OPPOSITE_IN_ISB else 1.0
@@ -88,7 +88,7 @@ def test_the_nine_angles(walk, vicons, quantity, convention):
         strides = [stride for stride in trial.strides if stride.side == side[0]]
         if not strides:
             continue
-        curve = of(f"{side[0].upper()}{one.joint}Angles", one.component)
+        curve = vicon_curve(f"{side[0].upper()}{angle.joint}Angles", angle.component)
         spans = [np.linspace(stride.start_s, stride.end_s, 101) for stride in strides]
         theirs = np.mean([np.interp(at, time, curve) for at in spans], axis=0)
         assert sign * correlation(drawn(figure, title, side), theirs) > ALIKE

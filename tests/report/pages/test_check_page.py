@@ -36,9 +36,9 @@ def test_ground_is_blue_or_red_in_contacts_and_grey_where_no_fit_can_use_the_fra
     for shape in figure.layout["shapes"]:
         drawn[panels[shape["yref"].removesuffix(" domain")]].append(shape)
     for shapes, plate in zip(drawn, walked.plates, strict=True):
-        contacts = [(one["x0"], one["x1"]) for one in shapes if one["opacity"] < 1]
-        assert contacts == [(one.start_s, one.end_s) for one in plate.contacts]
-        grey = sorted((one["x0"], one["x1"]) for one in shapes if one["opacity"] == 1)
+        contacts = [(rectangle["x0"], rectangle["x1"]) for rectangle in shapes if rectangle["opacity"] < 1]
+        assert contacts == [(contact.start_s, contact.end_s) for contact in plate.contacts]
+        grey = sorted((rectangle["x0"], rectangle["x1"]) for rectangle in shapes if rectangle["opacity"] == 1)
         (window,) = walked.windows
         assert [grey[0][1], grey[1][0]] == list(window)
         assert (grey[0][0], grey[1][1]) == (

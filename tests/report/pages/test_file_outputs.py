@@ -23,14 +23,14 @@ def with_outputs(fit):
     at = trial.kinematics.frames
     values = {}
     loads = trial.reactions.at(trial.time)
-    for one in model_outputs(trial.skeleton, fit.estimate, trial.motion, loads, fit.mass_kg, "plug-in-gait"):
-        if one.joint in ("Hip", "Knee", "Ankle") and one.kind != "FORCES":
-            values[one.name] = np.full((len(time), 3), np.nan)
-            values[one.name][at] = one.values * (1e-3 if one.kind == "MOMENTS" else 1.0)
-            values[one.name][at] += SHIFT_DEG if one.kind == "ANGLES" else 0.0
+    for model_output in model_outputs(trial.skeleton, fit.estimate, trial.motion, loads, fit.mass_kg, "plug-in-gait"):
+        if model_output.joint in ("Hip", "Knee", "Ankle") and model_output.kind != "FORCES":
+            values[model_output.name] = np.full((len(time), 3), np.nan)
+            values[model_output.name][at] = model_output.values * (1e-3 if model_output.kind == "MOMENTS" else 1.0)
+            values[model_output.name][at] += SHIFT_DEG if model_output.kind == "ANGLES" else 0.0
 
     def made(factor=1.0):
-        scaled = {name: each * (1.0 if name.endswith("Angles") else factor) for name, each in values.items()}
+        scaled = {name: points * (1.0 if name.endswith("Angles") else factor) for name, points in values.items()}
         stated = replace(trial.kinematics.trial, outputs=FileOutputs(time, scaled))
         return replace(fit, trials=(replace(trial, kinematics=replace(trial.kinematics, trial=stated)),))
 
@@ -42,16 +42,16 @@ def test_curves_that_are_the_same_and_shifted_ones(with_outputs, per_kg):
     fit = with_outputs(1.0 if per_kg else with_outputs().mass_kg)
     compared = compared_outputs(fit, fit.trials[0])
     assert len(compared) == 18
-    for one in compared:
-        assert one.correlation == pytest.approx(1.0, abs=1e-9)
-        if one.kind == "ANGLES":
-            assert one.rms == pytest.approx(SHIFT_DEG, abs=1e-6)
-            assert one.mean == pytest.approx(SHIFT_DEG, abs=1e-6)
+    for comparison in compared:
+        assert comparison.correlation == pytest.approx(1.0, abs=1e-9)
+        if comparison.kind == "ANGLES":
+            assert comparison.rms == pytest.approx(SHIFT_DEG, abs=1e-6)
+            assert comparison.mean == pytest.approx(SHIFT_DEG, abs=1e-6)
         else:
-            assert one.rms < 1e-6
-            assert not one.beyond
-            assert one.outside == 0.0
-    assert {one.quantity for one in compared if one.joint == "Knee"} == {
+            assert comparison.rms < 1e-6
+            assert not comparison.beyond
+            assert comparison.outside == 0.0
+    assert {comparison.quantity for comparison in compared if comparison.joint == "Knee"} == {
         "Knee flexion angle",
         "Knee extension moment",
         "Knee power",

@@ -55,12 +55,14 @@ def test_what_a_finding_explains_is_folded_below_it_to_the_last_consequence():
 
 def test_equal_findings_are_one_card_with_the_evidence_of_each():
     ((_, (card,)),) = view(*FROZEN).sections
-    assert [one.place for one in card.measured] == ["LANK, 1.20 to 1.70 s", "LTOE, 1.20 to 1.70 s"]
+    assert [place.place for place in card.measured] == ["LANK, 1.20 to 1.70 s", "LTOE, 1.20 to 1.70 s"]
 
 
 def test_findings_of_several_models_are_told_apart_by_their_files_and_each_explains_its_own():
     models = [
-        Overview([one.in_file(file) for one in (cause, finding("O302", Where(part="knee")).muted("O301"))], 61, 1)
+        Overview(
+            [finding_.in_file(file) for finding_ in (cause, finding("O302", Where(part="knee")).muted("O301"))], 61, 1
+        )
         for file, cause in (("a.osim", finding("O301")), ("b.osim", finding("O301")))
     ]
     ((_, cards),) = FindingView(models).sections
@@ -88,7 +90,11 @@ def test_an_assumption_about_several_trials_is_said_once():
 
 def test_an_assumption_that_differs_between_trials_is_told_for_each():
     at = [
-        finding("P270", Where(trial=name), **{each: Quantity(count, "1") for each in ("frames", "count", "left_out")})
+        finding(
+            "P270",
+            Where(trial=name),
+            **{quantity: Quantity(count, "1") for quantity in ("frames", "count", "left_out")},
+        )
         for name, count in (("walk", 1), ("run", 2), ("jump", 1))
     ]
     assert [trials for _, trials in view(*at).notes] == ["walk, jump", "run"]
@@ -108,12 +114,12 @@ def test_words_that_the_message_has_are_no_evidence_again():
 def test_ignored_findings_are_counted_and_nowhere_else():
     shown = view(*FAULTY, replace(IGNORED, where=Where(trial="run")))
     assert shown.ignored == "M102 (2)"
-    assert "M102" not in [one.code for one in shown.rules]
+    assert "M102" not in [reported.code for reported in shown.rules]
     assert [(group.first.code, trials) for group, trials in shown.notes] == [(ASSUMED.code, "walk")]
 
 
 def test_every_code_on_the_page_is_explained_there():
-    assert [one.code for one in view(*UNUSABLE).rules] == [
+    assert [reported.code for reported in view(*UNUSABLE).rules] == [
         "M113", "P213", "P214", "P215", "P244", "R111", "R301", "T214",
     ]  # fmt: skip
 
@@ -151,7 +157,7 @@ def test_places_are_named_as_far_as_they_are_known():
 def test_the_page_in_the_browser_gets_verdict_and_open_findings():
     told = digest(Overview(UNUSABLE, 61, 1), {})
     assert told["verdict"] == "do not use"
-    assert [(one["code"], one["severity"], one["status"]) for one in told["findings"]] == [
+    assert [(reported["code"], reported["severity"], reported["status"]) for reported in told["findings"]] == [
         (WAIVED.code, "ERROR", "waived"),
         (RESIDUAL.code, "ERROR", "open"),
         ("M113", "WARNING", "open"),

@@ -131,15 +131,15 @@ def test_held_segments_are_named_and_not_counted(of_model):
 
 
 def test_start_is_called_what_it_is(fit, of_model):
-    for one, word in ((fit, "literature values"), (of_model, "the model's own values")):
-        assert any(word in (trace.name or "") for trace in one.plot.residuals().data)
-        assert any(word in (trace.name or "") for trace in one.plot.moments().data)
+    for result, word in ((fit, "literature values"), (of_model, "the model's own values")):
+        assert any(word in (trace.name or "") for trace in result.plot.residuals().data)
+        assert any(word in (trace.name or "") for trace in result.plot.moments().data)
     assert "literature" not in Elements(render(replace(of_model, findings=(), notes=()))).text.lower()
 
 
 def test_changes_are_counted_from_the_prior_and_called_so(fit):
     told = replace(fit, posterior=replace(fit.posterior, prior_mean=fit.estimate))
-    captions = [render(one).count("Zero is the prior.") for one in (fit, told)]
+    captions = [render(result).count("Zero is the prior.") for result in (fit, told)]
     assert captions[0] == 0
     assert captions[1] >= 2
 
@@ -222,8 +222,8 @@ def test_legends_have_at_most_four_entries(page):
 def test_a_reason_is_given_once():
     moments, parameters, opensim = (Purpose(name, "use", "whole stride; 2 N") for name in ("Moments", "B", "OpenSim"))
     shown = without_repetition([moments, parameters._replace(reason="other"), opensim], "whole stride")
-    assert [one.reason for one in shown] == ["2 N", "other", "as moments"]
-    assert [one.use for one in shown] == ["use"] * 3
+    assert [purpose.reason for purpose in shown] == ["2 N", "other", "as moments"]
+    assert [purpose.use for purpose in shown] == ["use"] * 3
 
 
 def test_every_picture_has_words_and_data(page):
@@ -258,8 +258,11 @@ def test_names_cannot_become_markup(fit, page):
     kinematics = trial.kinematics
     label = kinematics.ik.labels[0]
     markers = kinematics.trial.markers
-    named = [EVIL if one == label else one for one in markers.labels]
-    ik = replace(kinematics.ik, labels=tuple(EVIL if one == label else one for one in kinematics.ik.labels))
+    named = [EVIL if known_label == label else known_label for known_label in markers.labels]
+    ik = replace(
+        kinematics.ik,
+        labels=tuple(EVIL if known_label == label else known_label for known_label in kinematics.ik.labels),
+    )
     renamed = replace(kinematics.trial, name=f"walk {EVIL}", markers=replace(markers, labels=tuple(named)))
     skeleton = fit.skeleton.with_markers(
         [replace(m, label=EVIL) if m.label == label else m for m in fit.skeleton.markers]
@@ -269,7 +272,9 @@ def test_names_cannot_become_markup(fit, page):
         subject=subject,
         skeleton=skeleton,
         trials=(replace(trial, kinematics=replace(kinematics, trial=renamed, ik=ik)),),
-        findings=tuple(replace(one, where=replace(one.where, trial=EVIL, plate=EVIL)) for one in UNUSABLE),
+        findings=tuple(
+            replace(reported, where=replace(reported.where, trial=EVIL, plate=EVIL)) for reported in UNUSABLE
+        ),
         left_out=(EVIL,),
         notes=(EVIL,),
     )
@@ -283,15 +288,15 @@ def test_names_cannot_become_markup(fit, page):
         assert not Elements(html).named("script")
         assert EVIL in Elements(html).text
     labels = figures_of(render(evil))["trial1-markers"]["data"][0]["y"]
-    assert any("&lt;/script&gt;" in one for one in labels)
-    assert not any("<" in one for one in labels)
+    assert any("&lt;/script&gt;" in shown_label for shown_label in labels)
+    assert not any("<" in shown_label for shown_label in labels)
 
 
 def test_report_shows_findings_notes_and_settings(fit):
     shown = replace(fit, findings=UNUSABLE, rules=61, left_out=("walk 2",), notes=("the dog bites",))
     page = render(shown)
     elements = Elements(page)
-    open_ones = [one for one in UNUSABLE if one.status != "ignored"]
+    open_ones = [reported for reported in UNUSABLE if reported.status != "ignored"]
     for text in ("the dog bites", "simultaneous", "hip_centre", "numpy", fit.subject.name, "walk 2"):
         assert text in elements.text
     view = FindingView([shown.overview])
@@ -301,7 +306,7 @@ def test_report_shows_findings_notes_and_settings(fit):
     for text in ("all plates", "position x", "hip_r", "centre change z", "synchronisation"):
         assert text in elements.text
     explained = {attrs["id"] for attrs in elements.named("h3") if attrs.get("id", "").startswith("explain-")}
-    assert explained == {f"explain-{one.code}" for one in open_ones}
+    assert explained == {f"explain-{reported.code}" for reported in open_ones}
     (headline,) = re.findall(r'<p class="headline (\w+)', page)
     assert headline == "error"
 
@@ -348,12 +353,12 @@ def test_the_command_in_a_report_repeats_the_fit(demo_run, tmp_path):
 
 def test_a_marker_set_of_the_user_counts_as_a_file(demo_run, tmp_path):
     demo, _ = demo_run
-    own = tmp_path / "mine.toml"
-    own.write_text("x")
+    set_file = tmp_path / "mine.toml"
+    set_file.write_text("x")
     wanted = read_subject(demo.subject_file)
-    wanted = wanted.model_copy(update={"model": wanted.model.model_copy(update={"markers": own})})
+    wanted = wanted.model_copy(update={"model": wanted.model.model_copy(update={"markers": set_file})})
     files = provenance_of(wanted, "kinertia fit subject.toml").files
     above = Path(os.path.commonpath([tmp_path, demo.subject_file.parent]))
-    assert files[str(own.relative_to(above))] == hashlib.sha256(b"x").hexdigest()
+    assert files[str(set_file.relative_to(above))] == hashlib.sha256(b"x").hexdigest()
     assert len(files) == 4
     assert set(provenance_of(read_subject(demo.subject_file), "").files) == {"static.trc", "walk.trc", "walk_grf.mot"}

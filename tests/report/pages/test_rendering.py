@@ -32,7 +32,7 @@ def test_plan_draws_counts_and_shares(tmp_path):
     bars, dots = drawn(page).values()
     counts = [PLAN.counts(names) for names in PLAN.sd]
     assert [trace["x"] for trace in bars["data"]] == [
-        [one[word] for one in counts] for word in ("measured", "informed", "assumed")
+        [count[word] for count in counts] for word in ("measured", "informed", "assumed")
     ]
     assert [trace["x"] for trace in dots["data"]] == [pytest.approx([0.4, 0.9, 0.2])] * 3
     assert [row[0] for row in plan_rows(PLAN)] == ["walk", "<i>squat", "walk + <i>squat"]

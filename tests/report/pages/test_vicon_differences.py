@@ -53,9 +53,11 @@ def heavier(body, ratio):
     return replace(body, mass_kg=ratio * body.mass_kg, inertia_kgm2=ratio * body.inertia_kgm2)
 
 
-def of(fit, joint, component, side="r"):
+def difference_of(fit, joint, component, side="r"):
     (found,) = [
-        one for one in curve_differences(fit) if (one.joint, one.component, one.side) == (joint, component, side)
+        curve_difference
+        for curve_difference in curve_differences(fit)
+        if (curve_difference.joint, curve_difference.component, curve_difference.side) == (joint, component, side)
     ]
     return found
 
@@ -63,13 +65,13 @@ def of(fit, joint, component, side="r"):
 def test_the_same_moments_are_within_the_error_bars(fit):
     found = curve_differences(as_vicon_has_it(fit))
     assert len(found) == 2 * 3 * len(COMPONENTS)
-    assert {one.cause for one in found} == {"within"}
-    assert max(one.bars for one in found) < 0.5
-    assert max(one.apart_mm for one in found) < 1e-6
+    assert {difference.cause for difference in found} == {"within"}
+    assert max(difference.bars for difference in found) < 0.5
+    assert max(difference.apart_mm for difference in found) < 1e-6
 
 
 def test_another_joint_centre(fit):
-    found = of(as_vicon_has_it(fit, moved_m=(0.0, 0.0, 0.06)), "Hip", "adduction")
+    found = difference_of(as_vicon_has_it(fit, moved_m=(0.0, 0.0, 0.06)), "Hip", "adduction")
     assert (found.cause, found.tried) == ("centre", True)
     assert found.explained > 0.9
     assert found.bars > 1.0
@@ -77,44 +79,52 @@ def test_another_joint_centre(fit):
 
 
 def test_other_axes(fit):
-    found = of(as_vicon_has_it(fit, turned_deg=25.0), "Ankle", "rotation")
+    found = difference_of(as_vicon_has_it(fit, turned_deg=25.0), "Ankle", "rotation")
     assert found.cause in ("axes", "within")
-    turned = [one for one in curve_differences(as_vicon_has_it(fit, turned_deg=25.0)) if one.cause != "within"]
+    turned = [
+        curve_difference
+        for curve_difference in curve_differences(as_vicon_has_it(fit, turned_deg=25.0))
+        if curve_difference.cause != "within"
+    ]
     assert turned
-    assert {one.cause for one in turned} == {"axes"}
+    assert {difference.cause for difference in turned} == {"axes"}
     assert found.apart_deg == pytest.approx(25.0, abs=0.1)
 
 
 def test_corrected_forces(fit):
-    changed = [one for one in curve_differences(as_vicon_has_it(fit, gain=1.3)) if one.cause != "within"]
-    assert {one.joint for one in changed} >= {"Ankle"}
-    assert {one.cause for one in changed} == {"forces"}
+    changed = [
+        curve_difference
+        for curve_difference in curve_differences(as_vicon_has_it(fit, gain=1.3))
+        if curve_difference.cause != "within"
+    ]
+    assert {difference.joint for difference in changed} >= {"Ankle"}
+    assert {difference.cause for difference in changed} == {"forces"}
 
 
 def test_other_segments(fit):
     body = heavier(fit.literature, 3.0)
     other = as_vicon_has_it(replace(fit, literature=body), body=body)
-    changed = [one for one in curve_differences(other) if one.cause != "within"]
+    changed = [curve_difference for curve_difference in curve_differences(other) if curve_difference.cause != "within"]
     assert changed
-    assert {one.cause for one in changed} == {"tables"}
+    assert {difference.cause for difference in changed} == {"tables"}
 
 
 def test_unfiltered_moments(fit):
     fast = as_vicon_has_it(fit, added=lambda time: 0.5 * np.cos(np.pi * np.round((time - time[0]) * 100.0)))
-    assert {one.cause for one in curve_differences(fast)} == {"filter"}
+    assert {curve_difference.cause for curve_difference in curve_differences(fast)} == {"filter"}
 
 
 def test_what_nothing_explains_has_no_cause(fit):
     slow = as_vicon_has_it(fit, added=lambda time: np.full_like(time, 0.5))
     found = curve_differences(slow)
-    assert {one.cause for one in found} == {""}
-    assert all(np.isnan(one.explained) for one in found)
+    assert {difference.cause for difference in found} == {""}
+    assert all(np.isnan(difference.explained) for difference in found)
 
 
 def test_without_vicons_points_centres_and_axes_are_not_accused(fit):
     found = curve_differences(as_vicon_has_it(fit, moved_m=(0.0, 0.0, 0.06), turned_deg=25.0, points=False))
-    assert not any(one.tried for one in found)
-    assert not {one.cause for one in found} & {"centre", "axes", "together"}
+    assert not any(difference.tried for difference in found)
+    assert not {difference.cause for difference in found} & {"centre", "axes", "together"}
 
 
 def test_the_report_shows_a_row_per_curve(fit):
@@ -136,7 +146,7 @@ def test_a_file_with_curves_of_one_side_only(fit):
     """As where the other foot is on no plate."""
     (trial,) = as_vicon_has_it(fit).trials
     outputs = trial.kinematics.trial.outputs
-    left = replace(outputs, values={name: each for name, each in outputs.values.items() if name.startswith("L")})
+    left = replace(outputs, values={name: value for name, value in outputs.values.items() if name.startswith("L")})
     stated = replace(trial.kinematics, trial=replace(trial.kinematics.trial, outputs=left))
     page = render(replace(fit, trials=(replace(trial, kinematics=stated),)))
     row = page[page.index('id="vicon"') :].partition("Hip flexion")[2].partition("</tr>")[0]
@@ -148,7 +158,7 @@ def test_a_file_with_curves_of_one_side_only(fit):
 @pytest.mark.measured
 def test_of_a_measured_walk(fit_of):
     """Feet of this file have axes that are 11 degrees from Kinertia's, and all else is within the error bars."""
-    found = of(load_fit(fit_of("pig_b").folder), "Ankle", "rotation")
+    found = difference_of(load_fit(fit_of("pig_b").folder), "Ankle", "rotation")
     assert found.cause == "axes"
     assert found.explained > 0.9
     assert 8.0 < found.apart_deg < 14.0

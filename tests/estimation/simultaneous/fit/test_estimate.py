@@ -45,7 +45,8 @@ def test_intervals_are_used_together_and_forces_between_them_say_nothing(trial, 
     loads[(trial.time > 0.4) & (trial.time < 0.5)] *= 0.7
     windows = ((0.06, 0.3), (0.6, 0.84))
     outcomes = [
-        estimated(trial, [replace(seen(trial, loads=each), windows_s=windows)]) for each in (trial.foot_loads, loads)
+        estimated(trial, [replace(seen(trial, loads=foot_loads), windows_s=windows)])
+        for foot_loads in (trial.foot_loads, loads)
     ]
     for outcome in outcomes:
         (motion,) = outcome.motions
@@ -90,7 +91,7 @@ def test_a_wrong_axis_of_the_knee_is_found_where_axes_are_free(trial, plain):
         assert entry.prior_sd == pytest.approx(np.radians(5.0))
         assert entry.sd < 0.7 * entry.prior_sd
         assert abs(entry.value + put_in) < 3.0 * entry.sd
-    assert "axis change" not in {one.quantity for one in plain.posterior.calibration}
+    assert "axis change" not in {error.quantity for error in plain.posterior.calibration}
 
 
 def test_a_model_that_is_contradicted_is_called_so(trial):
@@ -99,11 +100,11 @@ def test_a_model_that_is_contradicted_is_called_so(trial):
     com[literature.segments.index("torso"), 0] += 0.15
     wrong = replace(literature, com_m=com)
     found = of_estimate(fitted(trial, wrong), literature=wrong)
-    far = {one.where.part: one.evidence["distance_sd"].value for one in found if one.code == "R203"}
+    far = {finding.where.part: finding.evidence["distance_sd"].value for finding in found if finding.code == "R203"}
     assert far["centre of mass along x of torso"] < -3.0
 
 
 def test_an_unfinished_estimate_is_called_so(trial, monkeypatch):
     monkeypatch.setattr("kinertia.estimation.simultaneous.solver._MAX_ITERATIONS", 1)
-    (found,) = [one for one in of_estimate(fitted(trial)) if one.code == "R201"]
+    (found,) = [finding for finding in of_estimate(fitted(trial)) if finding.code == "R201"]
     assert found.evidence["iterations"].value == 1

@@ -20,8 +20,8 @@ def test_a_drifting_marker_is_named(trial):
         at = trial.markers.labels.index("R.Bicep")
         positions[:, at] += np.random.default_rng(1).normal(0.0, 0.05, positions[:, at].shape)
 
-    drifting = [one for one in of_estimate(fitted(trial, disturb=wander)) if one.code == "M163"]
-    (found,) = [one for one in drifting if one.where.markers == ("R.Bicep",)]
+    drifting = [finding for finding in of_estimate(fitted(trial, disturb=wander)) if finding.code == "M163"]
+    (found,) = [finding for finding in drifting if finding.where.markers == ("R.Bicep",)]
     assert found.where.trial == "walk"
     assert found.evidence["sd_m"].value > 3.0 * found.evidence["usual_sd_m"].value
 
@@ -32,12 +32,14 @@ def test_a_marker_attached_anew_between_trials_is_named(trial):
     turned = trial.skeleton.pose(trial.motion.q).rotation[:, trial.skeleton.marker_segments[at]]
     positions = [camera_noise(trial.markers, 0.002, np.random.default_rng(seed)).positions for seed in (0, 1)]
     positions[1][:, at] += turned @ [0.0, -0.05, 0.0]
-    kinematics = [kinematics_of(trial, replace(trial.markers, positions=each), trial.foot_loads) for each in positions]
+    kinematics = [
+        kinematics_of(trial, replace(trial.markers, positions=position), trial.foot_loads) for position in positions
+    ]
     outcome = estimated(trial, kinematics)
     found = of_estimate(outcome, "one", "two")
     assert codes(found) == ["M162", "M162"]  # of two trials, either may be the odd one
-    assert [one.where.trial for one in found] == ["one", "two"]
-    assert {one.where.markers for one in found} == {("R.Thigh.Front",)}
+    assert [finding.where.trial for finding in found] == ["one", "two"]
+    assert {finding.where.markers for finding in found} == {("R.Thigh.Front",)}
     assert found[0].evidence["difference_m"].value == pytest.approx(0.05, abs=0.01)
     places = [skeleton.markers[skeleton.labels.index("R.Thigh.Front")].position[1] for skeleton in outcome.skeletons]
     assert places[1] - places[0] == pytest.approx(-0.05, abs=0.01)
@@ -50,7 +52,7 @@ def test_markers_that_stay_do_so_in_every_trial(trial):
     places = trial.skeleton.marker_locals + rng.normal(0.0, 0.012, trial.skeleton.marker_locals.shape)
     wrong = replace(trial, skeleton=trial.skeleton.with_positions(places))
     markers = [camera_noise(trial.markers, sd_m, rng) for sd_m in (0.001, 0.002)]
-    kinematics = [kinematics_of(wrong, each, trial.foot_loads) for each in markers]
+    kinematics = [kinematics_of(wrong, marker, trial.foot_loads) for marker in markers]
     outcome = estimated(wrong, kinematics, uncertainty=replace(GAIT27_UNCERTAINTY, marker_sd_m=None))
     for skeleton in (outcome.skeleton, *outcome.skeletons):
         np.testing.assert_array_equal(skeleton.marker_locals, wrong.skeleton.marker_locals)
@@ -66,7 +68,10 @@ def test_only_angles_are_less_certain_where_markers_were_adapted_far_and_axes_ar
     trial = walk(walking_subject(), 0.8, 100.0)
     kinematics = [seen(trial)]
     moved = replace(GAIT27_UNCERTAINTY, moved_m={"torso": 0.03}).with_fixed_axes()
-    before, after = (estimated(trial, kinematics, uncertainty=one).deviations[0] for one in (GAIT27_UNCERTAINTY, moved))
+    before, after = (
+        estimated(trial, kinematics, uncertainty=uncertainty).deviations[0]
+        for uncertainty in (GAIT27_UNCERTAINTY, moved)
+    )
     growth = dict(
         zip(trial.skeleton.coordinates, np.nanmedian(after.coordinates / before.coordinates, axis=0), strict=True)
     )

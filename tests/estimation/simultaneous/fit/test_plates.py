@@ -29,9 +29,9 @@ def test_calibration_is_told_with_its_deviations(plain):
     delay = entry_of(plain, "delay")
     assert (delay.prior_sd, delay.unit) == (DELAY_PRIOR_S.sd, "s")
     assert delay.contradicted_by is None
-    assert len({one.key for one in plain.posterior.calibration}) == len(plain.posterior.calibration)
-    for one in plain.posterior.calibration:
-        assert 0 < one.sd <= one.prior_sd * (1 + 1e-9), one
+    assert len({error.key for error in plain.posterior.calibration}) == len(plain.posterior.calibration)
+    for error in plain.posterior.calibration:
+        assert 0 < error.sd <= error.prior_sd * (1 + 1e-9), error
 
 
 def test_a_displaced_plate_is_named(trial):
@@ -39,7 +39,7 @@ def test_a_displaced_plate_is_named(trial):
         loads[:, 0, 3:] += np.cross([0.0, 0.0, 0.03], loads[:, 0, :3])
 
     outcome = fitted(trial, disturb=shift)
-    (found,) = [one for one in of_estimate(outcome) if one.code == "P246"]
+    (found,) = [finding for finding in of_estimate(outcome) if finding.code == "P246"]
     assert (found.where.plate, found.where.axis, found.causes) == ("right foot", "mediolateral", ("the instrument",))
     assert found.evidence["offset_m"].value > 0.0
 
@@ -54,7 +54,7 @@ def test_a_wrong_gain_is_named(trial, plain):
         loads[:, 0] *= 0.9
 
     outcome = fitted(trial, disturb=weaken)
-    (found,) = [one for one in of_estimate(outcome) if one.code == "P223"]
+    (found,) = [finding for finding in of_estimate(outcome) if finding.code == "P223"]
     assert (found.where.plate, found.where.trial) == ("right foot", "walk")
     assert found.evidence["gain_error"].value == pytest.approx(-0.1, abs=0.03)
     where = {"plate": "right foot", "trial": "walk"}
@@ -65,8 +65,8 @@ def test_a_wrong_gain_is_named(trial, plain):
 
     assert compared_with(outcome, outcome).posterior.calibration == outcome.posterior.calibration
     alone = compared_with(outcome, plain)
-    assert [one for one in outcome.posterior.calibration if one.supported] == [entry]
-    assert not any(one.supported for one in alone.posterior.calibration)
+    assert [error for error in outcome.posterior.calibration if error.supported] == [entry]
+    assert not any(error.supported for error in alone.posterior.calibration)
     assert entry_of(alone, "gain", **where).contradicted_by
     assert not entry.contradicted_by
     assert outcome.result.bsp.total_mass_kg == pytest.approx(walking_subject().literature.total_mass_kg, rel=0.02)
@@ -79,7 +79,7 @@ def test_a_load_that_is_missing_late_in_stance_is_not_a_gain(trial):
         first, last = longest_load(loads[:, 0, 1])
         loads[first : last + 1, 0] *= 1.0 - np.clip(np.linspace(-1.0, 1.0, last + 1 - first), 0.0, 0.5)[:, None]
 
-    (found,) = [one for one in of_estimate(fitted(trial, disturb=beyond_edge)) if one.code == "P288"]
+    (found,) = [finding for finding in of_estimate(fitted(trial, disturb=beyond_edge)) if finding.code == "P288"]
     assert (found.where.plate, found.where.trial) == ("right foot", "walk")
     assert found.evidence["missing"].value > 0.1
 
@@ -114,9 +114,9 @@ def test_zeros_of_a_plate_that_two_trials_share_are_each_trial_s_own(trial):
         loads[:, 1] += np.concatenate([force, np.cross(centre_of_pressure(loads[:, 1]), force)], axis=1)
         kinematics.append(seen(trial, seed, loads=loads, name=f"walk {seed}"))
     outcome = estimated(trial, kinematics)
-    own = [entry_of(outcome, "zero offset", plate="left foot", trial=f"walk {k}", axis="x") for k in range(2)]
-    assert own[0].value == pytest.approx(0.0, abs=1.0)
-    assert own[1].value == pytest.approx(-8.0, abs=3.0 * own[1].sd)
+    zeros = [entry_of(outcome, "zero offset", plate="left foot", trial=f"walk {k}", axis="x") for k in range(2)]
+    assert zeros[0].value == pytest.approx(0.0, abs=1.0)
+    assert zeros[1].value == pytest.approx(-8.0, abs=3.0 * zeros[1].sd)
     assert abs(entry_of(outcome, "position", plate="left foot", axis="x").value) < 0.002
 
 
@@ -138,10 +138,12 @@ def test_instruments_that_are_really_off_are_accused(trial, disturb, where):
     outcome = fitted(trial, disturb=lambda positions, loads: disturb(loads))
     entry = entry_of(outcome, **where)
     assert entry.moved > 1.0
-    supported = [one for one in outcome.posterior.calibration if one.supported]
+    supported = [error for error in outcome.posterior.calibration if error.supported]
     # of a single trial the delay is there as that of all trials, and as its total
-    assert {(one.plate, one.quantity, one.axis) for one in supported} == {(entry.plate, entry.quantity, entry.axis)}
-    assert sum(one.causes == ("the instrument",) for one in of_estimate(outcome)) == 1
+    assert {(error.plate, error.quantity, error.axis) for error in supported} == {
+        (entry.plate, entry.quantity, entry.axis)
+    }
+    assert sum(finding.causes == ("the instrument",) for finding in of_estimate(outcome)) == 1
 
 
 def test_of_plates_along_the_way_one_is_accused_if_not_which(trial):
@@ -150,7 +152,7 @@ def test_of_plates_along_the_way_one_is_accused_if_not_which(trial):
     def shift(positions, loads):
         loads[:, 0, 3:] += np.cross([0.02, 0.0, 0.0], loads[:, 0, :3])
 
-    (found,) = [one for one in of_estimate(fitted(trial, disturb=shift)) if one.code == "P247"]
+    (found,) = [finding for finding in of_estimate(fitted(trial, disturb=shift)) if finding.code == "P247"]
     assert found.where.axis == "fore-aft"
     assert 1e3 * found.evidence["difference_m"].value == pytest.approx(20.0, abs=4.5)  # as "16 mm" was before
 
@@ -195,7 +197,7 @@ def test_a_free_moment_that_is_not_there_is_named(trial):
     outcome = fitted(trial, disturb=crosstalk)
     entry = entry_of(outcome, "free moment", plate="left foot")
     assert entry.value == pytest.approx(0.008, abs=2.0 * PLATE_PRIOR["free moment"].sd)
-    (found,) = [one for one in of_estimate(outcome) if one.code == "P267"]
+    (found,) = [finding for finding in of_estimate(outcome) if finding.code == "P267"]
     assert found.where.plate == "left foot"
     assert found.evidence["error_nm_n"].value == entry.value
 
@@ -210,7 +212,7 @@ def test_plates_turned_against_the_cameras_are_named_and_put_right(trial, plain)
     (found,) = of_estimate(outcome)
     assert (found.code, found.where.plate) == ("P234", None)
     assert found.evidence["rotation_rad"].value == max(
-        one.value for one in entries
+        error.value for error in entries
     )  # counter-clockwise seen from above
     sound = entry_of(plain, "rotation", plate="left foot")
     assert abs(sound.value) < sound.prior_sd
@@ -220,7 +222,7 @@ def test_one_turned_plate_is_named_and_the_other_is_not(trial):
     outcome = fitted(trial, disturb=turned(6.0, (1,)))
     entry = entry_of(outcome, "rotation", plate="left foot")
     assert np.degrees(entry.value) == pytest.approx(6.0, abs=1.5)
-    (found,) = [one for one in of_estimate(outcome) if one.code in ("P234", "P237")]
+    (found,) = [finding for finding in of_estimate(outcome) if finding.code in ("P234", "P237")]
     assert (found.code, found.where.plate) == ("P237", "left foot")
 
 

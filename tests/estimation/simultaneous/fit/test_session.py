@@ -23,8 +23,8 @@ def test_forces_of_one_of_two_trials_are_late(trial):
     sound, late = fit_of(0, 0), fit_of(0, 1)
     frame_s = trial.time[1] - trial.time[0]
     for fit, expected in ((sound, 0.0), (late, frame_s)):
-        delays = [one for one in fit.posterior.calibration if one.quantity == "delay"]
-        clock, first, second = sorted(delays, key=lambda one: one.trial is not None)
+        delays = [error for error in fit.posterior.calibration if error.quantity == "delay"]
+        clock, first, second = sorted(delays, key=lambda error: error.trial is not None)
         assert abs(first.value) < min(0.3 * first.sd, 0.05 * frame_s)
         assert second.value == pytest.approx(expected, abs=3.0 * second.sd)
         assert max(first.sd, second.sd) < 0.25 * frame_s
@@ -74,5 +74,5 @@ def test_others_of_the_session_tell_what_a_plate_reads_and_the_clock(trial):
     # of a gain not: that in a trial may be another
     assert clock.sd < 0.7 * entry_of(alone, "delay").sd
     # what a person says of the clock does not grow by what it was told
-    own = [np.diag(each.result.instruments.information)[10] for each in (alone, helped)]
-    assert own[1] == pytest.approx(own[0], rel=0.1)
+    information = [np.diag(fit.result.instruments.information)[10] for fit in (alone, helped)]
+    assert information[1] == pytest.approx(information[0], rel=0.1)

@@ -10,8 +10,8 @@ from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
 def test_errors_are_recorded_minus_true():
     """A plate that reads 20 % too little, 10 mm too far forward, 2 N m/kN too much, turned and late."""
     solved, sds = np.array([-0.01, 0.0, 0.25, -0.002, 0.05]), np.full(5, 0.001)
-    errors = [one for _, _, one in laboratory_errors({"left": (solved, sds)}, (0.007, 0.001), InstrumentPrior())]
-    assert [(str(one), one.value, one.unit) for one in errors] == [
+    errors = [error for _, _, error in laboratory_errors({"left": (solved, sds)}, (0.007, 0.001), InstrumentPrior())]
+    assert [(str(error), error.value, error.unit) for error in errors] == [
         ("plate left: rotation", 0.05, "rad"),
         ("plate left: position x", 0.01, "m"),
         ("plate left: position z", 0.0, "m"),
@@ -26,9 +26,9 @@ def test_the_deviation_of_a_gain_is_that_of_the_error():
     factors = 1.0 + np.random.default_rng(0).normal(mean, sd, 100_000)
     values, sds = np.array([0.0, 0.0, mean, 0.0, 0.0]), np.full(5, sd)
     (gain,) = [
-        one
-        for _, _, one in laboratory_errors({"left": (values, sds)}, (0.0, 0.001), InstrumentPrior())
-        if one.quantity == "gain"
+        error
+        for _, _, error in laboratory_errors({"left": (values, sds)}, (0.0, 0.001), InstrumentPrior())
+        if error.quantity == "gain"
     ]
     assert gain.value == pytest.approx(np.mean(1.0 / factors - 1.0), abs=1e-5)
     assert gain.sd == pytest.approx(np.std(1.0 / factors), rel=0.02)

@@ -135,12 +135,14 @@ def clock_ms(recording_of, person, *moved_ms):
     """How late the clock is found to be where forces are moved by these times."""
     walk, static = (recording_of(f"{person}{kind}.c3d") for kind in ("walk", "static"))
     late = {}
-    for each in moved_ms:
-        plates = replace(walk.plates, time=walk.plates.time + each / 1e3)
+    for late_ms in moved_ms:
+        plates = replace(walk.plates, time=walk.plates.time + late_ms / 1e3)
         fit = estimate(prepare(Subject(sex="male"), static, [TrialInput(replace(walk, plates=plates))]))
         # of a single trial its own is the total
-        (total,) = (one for one in fit.posterior.calibration if one.quantity == "delay" and one.trial is not None)
-        late[each] = 1e3 * total.value
+        (total,) = (
+            error for error in fit.posterior.calibration if error.quantity == "delay" and error.trial is not None
+        )
+        late[late_ms] = 1e3 * total.value
     # a delay is known to some 3 ms
     assert (np.diff(list(late.values())) > -1.0).all()
     return late

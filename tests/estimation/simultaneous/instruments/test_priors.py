@@ -23,8 +23,8 @@ def shown(plates, seed=0):
 def test_what_a_posterior_adds_is_what_was_put_in():
     session, rng = shown(("a", "b")), np.random.default_rng(1)
     before = [(np.diag(rng.uniform(1e4, 1e6, 14)), rng.normal(size=14)) for _ in range(2)]
-    covariance = np.linalg.inv(session.information + sum(each for each, _ in before))
-    mean = covariance @ (session.rhs + sum(each for _, each in before))
+    covariance = np.linalg.inv(session.information + sum(known for known, _ in before))
+    mean = covariance @ (session.rhs + sum(known_rhs for _, known_rhs in before))
     added = InstrumentInformation.of_posterior(("a", "b"), mean, covariance, before)
     np.testing.assert_allclose(added.information, session.information, rtol=1e-6, atol=1e-3)
     np.testing.assert_allclose(added.rhs, session.rhs, rtol=1e-6, atol=1e-3)
@@ -48,10 +48,10 @@ def test_plates_that_are_not_there_are_marginalised(plates):
     covariance = np.linalg.inv(wide.information + precision)
     kept = [*range(EACH * len(plates)), *range(len(sd) - 4, len(sd))]
     narrow = session.among(plates, PRIOR)
-    own = np.linalg.inv(narrow.information + precision[np.ix_(kept, kept)])
-    np.testing.assert_allclose(own, covariance[np.ix_(kept, kept)], rtol=1e-6, atol=1e-14)
+    inverse = np.linalg.inv(narrow.information + precision[np.ix_(kept, kept)])
+    np.testing.assert_allclose(inverse, covariance[np.ix_(kept, kept)], rtol=1e-6, atol=1e-14)
     mean = covariance @ wide.rhs
-    np.testing.assert_allclose(own @ narrow.rhs, mean[kept], rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(inverse @ narrow.rhs, mean[kept], rtol=1e-6, atol=1e-12)
 
 
 def test_what_trials_have_of_their_own_is_marginalised():
@@ -63,9 +63,9 @@ def test_what_trials_have_of_their_own_is_marginalised():
     without = whole.without_own(sd)
     before = np.diag([*[1.0] * 9, *sd**-2.0])
     covariance = np.linalg.inv(whole.information + before)
-    own = np.linalg.inv(without.information + np.eye(9))
-    np.testing.assert_allclose(own, covariance[:9, :9])
-    np.testing.assert_allclose(own @ without.rhs, (covariance @ whole.rhs)[:9])
+    inverse = np.linalg.inv(without.information + np.eye(9))
+    np.testing.assert_allclose(inverse, covariance[:9, :9])
+    np.testing.assert_allclose(inverse @ without.rhs, (covariance @ whole.rhs)[:9])
     assert np.linalg.eigvalsh(without.information).min() > -1e-12
 
 
@@ -75,12 +75,12 @@ def test_a_stated_synchronisation_holds_in_every_trial(clock_sd_ms):
     several = small_problem(3)
     calibration = replace(several.calibration, instruments=prior)
     unknowns = InstrumentErrors.unknowns(replace(several.given, calibration=calibration))
-    priors = {one.name: one.prior.individual for one in unknowns}
+    priors = {unknown.name: unknown.prior.individual for unknown in unknowns}
     (clock,), delays = priors[CLOCK], priors[TRIAL_DELAYS]
     assert len(delays) == 3
     assert clock.nominal_sd == (0.0003 if clock_sd_ms is None else pytest.approx(clock_sd_ms / 1e3))
     fault = (0.010, 0.04) if clock_sd_ms is None else (0.00003, 0.0)
-    assert all((one.nominal_sd, one.faulty_sd, one.fault_probability) == (0.00003, *fault) for one in delays)
+    assert all((delay.nominal_sd, delay.faulty_sd, delay.fault_probability) == (0.00003, *fault) for delay in delays)
 
 
 def test_what_the_laboratory_states_replaces_the_literature():
@@ -119,8 +119,8 @@ def test_the_session_counts_in_the_normal_equations():
     with_session = type(problem)(problem.skeleton, problem.prior, calibration, problem.trials)
     places, static = problem.layout.laboratory, problem.layout.start.copy()
     static[places] = np.random.default_rng(2).normal(0.0, 0.01, places.stop - places.start)
-    before, information = (each.prior_information(static) for each in (problem, with_session))
-    (right_before, cost_before), (rhs, cost) = (each.prior_slope(static) for each in (problem, with_session))
+    before, information = (posed.prior_information(static) for posed in (problem, with_session))
+    (right_before, cost_before), (rhs, cost) = (posed.prior_slope(static) for posed in (problem, with_session))
     np.testing.assert_allclose((information - before)[places, places], 2.0 * session.information)
 
     def extra(values):
@@ -144,9 +144,9 @@ def test_who_has_checked_the_gain_has_checked_that_of_the_trial():
 
 @pytest.mark.parametrize(("clock_sd_ms", "expected"), [(None, 1), (0.5, 0)])
 def test_a_single_trial_may_be_late_by_itself_unless_its_clock_has_been_checked(clock_sd_ms, expected):
-    one = small_problem()
+    single = small_problem()
     known = InstrumentPrior.stated(Instruments(clock_sd_ms=clock_sd_ms))
-    problem = type(one)(one.skeleton, one.prior, replace(one.calibration, instruments=known), one.trials)
+    problem = type(single)(single.skeleton, single.prior, replace(single.calibration, instruments=known), single.trials)
     assert problem.layout[TRIAL_DELAYS].stop - problem.layout[TRIAL_DELAYS].start == expected
 
 

@@ -25,7 +25,7 @@ def trial(hz: float, amplitude_n: float = 40.0, rate_hz: float = 100.0):
 
 @pytest.mark.parametrize(("hz", "expected"), [(4.0, 10.0), (7.5, 12.0), (9.0, 15.0), (30.0, 15.0)])
 def test_it_follows_the_sum_of_the_forces(hz, expected):
-    assert [each.motion_hz for each in Bandwidth.of([trial(hz)])] == [expected]
+    assert [bandwidth.motion_hz for bandwidth in Bandwidth.of([trial(hz)])] == [expected]
 
 
 def test_markers_show_nothing_faster_than_their_frames():
@@ -34,7 +34,11 @@ def test_markers_show_nothing_faster_than_their_frames():
 
 
 def test_each_of_several_trials_has_its_own():
-    assert [each.motion_hz for each in Bandwidth.of([trial(4.0), trial(9.0), trial(4.0)])] == [10.0, 15.0, 10.0]
+    assert [bandwidth.motion_hz for bandwidth in Bandwidth.of([trial(4.0), trial(9.0), trial(4.0)])] == [
+        10.0,
+        15.0,
+        10.0,
+    ]
 
 
 def test_the_user_may_choose():

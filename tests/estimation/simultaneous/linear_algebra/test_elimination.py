@@ -84,7 +84,7 @@ def test_normal_equations_are_the_sum_over_time_blocks(whole, cut, here):
     close(actual.static_rhs, expected.static_rhs)
     close(actual.rhs, expected.rhs)
     assert actual.cost == pytest.approx(expected.cost, rel=1e-12)
-    static, band, border = (np.zeros_like(each) for each in (expected.static, expected.band, expected.border))
+    static, band, border = (np.zeros_like(matrix) for matrix in (expected.static, expected.band, expected.border))
     for time_block in cut.time_blocks[0]:
         part = cut.normal(0, *here, time_block)
         static += part.static
@@ -96,7 +96,7 @@ def test_normal_equations_are_the_sum_over_time_blocks(whole, cut, here):
 
 
 def test_elimination_and_steps_are_those_of_the_whole(whole, cut, here, double):
-    expected, actual = (each.eliminated(0, *here, DAMPING) for each in (whole, cut))
+    expected, actual = (problem_.eliminated(0, *here, DAMPING) for problem_ in (whole, cut))
     close(actual.gradient.rhs, whole.normal(0, *here).rhs)
     close(actual.information, expected.information)
     close(actual.static_diagonal, np.diag(whole.normal(0, *here).static))
@@ -138,12 +138,15 @@ def test_single_precision_loses_nothing_that_counts(cut, here, monkeypatch):
 
 
 def test_deviations_of_curves_are_those_of_the_whole(whole, cut, here, double):
-    expected, actual = (each.eliminated(0, *here) for each in (whole, cut))
+    expected, actual = (problem_.eliminated(0, *here) for problem_ in (whole, cut))
     information = expected.information + np.diag(1.0 / np.maximum(np.abs(here[1]), 0.1) ** 2)
     root = StaticInformation.of(information, whole.layout.in_root.stop).root_of_covariance()
-    sd = [curve_deviations(each, 0, *here, part, root, np.ones(3)) for each, part in ((whole, expected), (cut, actual))]
-    for one in fields(CurveDeviations):
-        close(getattr(sd[1], one.name), getattr(sd[0], one.name))
+    sd = [
+        curve_deviations(problem_, 0, *here, part, root, np.ones(3))
+        for problem_, part in ((whole, expected), (cut, actual))
+    ]
+    for field in fields(CurveDeviations):
+        close(getattr(sd[1], field.name), getattr(sd[0], field.name))
 
 
 @pytest.mark.slow
@@ -177,14 +180,14 @@ def test_two_threads_give_what_one_gives_bit_for_bit(monkeypatch):
     for cores in (1, 2):
         monkeypatch.setattr(workload, "cores", lambda cores=cores: cores)
         results.append(estimate_simultaneous(*given))
-    one, two = results
+    single, two = results
     assert len(problem.time_blocks[0]) > 1
-    assert two.cost == one.cost
-    np.testing.assert_array_equal(two.bsp.table(), one.bsp.table())
-    np.testing.assert_array_equal(two.bsp_covariance, one.bsp_covariance)
-    np.testing.assert_array_equal(two.motions[0].qdd, one.motions[0].qdd)
-    for each in fields(CurveDeviations):
-        np.testing.assert_array_equal(*(getattr(result.curve_deviations[0], each.name) for result in results))
+    assert two.cost == single.cost
+    np.testing.assert_array_equal(two.bsp.table(), single.bsp.table())
+    np.testing.assert_array_equal(two.bsp_covariance, single.bsp_covariance)
+    np.testing.assert_array_equal(two.motions[0].qdd, single.motions[0].qdd)
+    for field in fields(CurveDeviations):
+        np.testing.assert_array_equal(*(getattr(result.curve_deviations[0], field.name) for result in results))
 
 
 @pytest.mark.parametrize("splines", [6, 7, 11, 12, 13, 18, 19, 40])
@@ -209,8 +212,8 @@ def test_time_blocks_share_splines_and_frames_out(splines):
     assert basis.size == splines
     parts = time_blocks(basis, 12)
     assert [part.is_last for part in parts] == [False] * (len(parts) - 1) + [True]
-    own = [spline for part in parts for spline in range(part.splines.start, part.splines.stop)]
-    assert own == list(range(splines))
+    indices = [spline for part in parts for spline in range(part.splines.start, part.splines.stop)]
+    assert indices == list(range(splines))
     frames = [frame for part in parts for frame in range(part.frames.start, part.frames.stop)]
     assert frames == list(range(len(basis.first)))
     for part in parts:

@@ -9,10 +9,10 @@ PROCESSES = [ErrorProcess(), ErrorProcess.double_over(9.0), ErrorProcess.with_sm
 
 def made(process: ErrorProcess, n: int, rng: np.random.Generator, columns: int = 40) -> np.ndarray:
     """(n, columns) errors of unit variance, begun long before."""
-    (one, two), errors = process.of_before, np.zeros((n + 500, columns))
+    (lag1, two), errors = process.of_before, np.zeros((n + 500, columns))
     news = np.sqrt(process.new) * rng.standard_normal(errors.shape)
     for k in range(2, len(errors)):
-        errors[k] = one * errors[k - 1] + two * errors[k - 2] + news[k]
+        errors[k] = lag1 * errors[k - 1] + two * errors[k - 2] + news[k]
     return errors[500:]
 
 
@@ -33,7 +33,7 @@ def test_the_poles_make_errors_alike_over_so_many_frames(frames, smaller):
 def test_news_is_what_a_frame_shows_beyond_the_two_before_it():
     rng = np.random.default_rng(0)
     process = ErrorProcess.with_smaller(0.3, 12.0)
-    beyond = np.array([1.0, *(-each for each in process.of_before)])
+    beyond = np.array([1.0, *(-coefficient for coefficient in process.of_before)])
     assert beyond @ together(made(process, 4000, rng)) @ beyond == pytest.approx(process.new, rel=0.02)
 
 
@@ -56,7 +56,7 @@ def test_no_less_news_than_in_the_errors_where_the_cameras_add_theirs(white):
     double = ErrorProcess.double_over(frames)
     recovered, variance = ErrorProcess.read(frames, seen[None])
     for process, scale, least, most in ((recovered, variance, 0.6, 1.0 + 1e-9), (double, 1.0, 1.4, np.inf)):
-        beyond = np.array([1.0, *(-each for each in process.of_before)])
+        beyond = np.array([1.0, *(-coefficient for coefficient in process.of_before)])
         assert least < (beyond @ seen @ beyond) / (scale * process.new) < most
     assert recovered.frames * variance == pytest.approx(frames, rel=1e-6)
     assert recovered.smaller < double.smaller

@@ -35,8 +35,8 @@ def test_markers_that_err_alike(seen):
     errors[:, 0] = np.nan
     result, filled = module.markers_in_common(skeleton, errors), np.nan_to_num(errors)
     for segment in np.unique(skeleton.marker_segments):
-        own = filled[:, skeleton.marker_segments == segment]
-        expected = max(1.0, np.square(own.sum(axis=1)).sum() / np.square(own).sum())
+        of_segment = filled[:, skeleton.marker_segments == segment]
+        expected = max(1.0, np.square(of_segment.sum(axis=1)).sum() / np.square(of_segment).sum())
         np.testing.assert_allclose(result[skeleton.marker_segments == segment], expected)
     np.testing.assert_array_equal(module.markers_in_common(skeleton, np.zeros_like(errors)), 1.0)
 
@@ -118,7 +118,7 @@ def test_other_trials_with_the_same_errors_count_by_their_strides(stride):
 def test_trials_with_errors_of_their_own_do_not_count():
     rng = np.random.default_rng(2)
     slow = [np.cumsum(rng.normal(size=(200, 120)), axis=0) for _ in range(2)]
-    slow = [each - each.mean(axis=0) for each in slow]
+    slow = [errors_m - errors_m.mean(axis=0) for errors_m in slow]
     assert repeats(slow, [100.0, 100.0]) == pytest.approx(np.eye(2), abs=1e-12)
 
 

@@ -55,11 +55,11 @@ def test_coefficients_of_a_segment_are_alike(trial, patterns):
     covariance = np.linalg.inv(patterns.information())
     assert np.diag(covariance) == pytest.approx(np.ones(patterns.size))
     thigh = np.flatnonzero(trial.skeleton.marker_segments == trial.skeleton.segments.index("thigh_r"))
-    one, other = (patterns.begin[marker] for marker in thigh[:2])
-    assert covariance[one, other] == pytest.approx(ALIKE)
-    assert covariance[one, other + 1] == pytest.approx(0.0, abs=1e-12)
+    first, other = (patterns.begin[marker] for marker in thigh[:2])
+    assert covariance[first, other] == pytest.approx(ALIKE)
+    assert covariance[first, other + 1] == pytest.approx(0.0, abs=1e-12)
     elsewhere = np.flatnonzero(trial.skeleton.marker_segments == trial.skeleton.segments.index("shank_r"))[0]
-    assert covariance[one, patterns.begin[elsewhere]] == pytest.approx(0.0, abs=1e-12)
+    assert covariance[first, patterns.begin[elsewhere]] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_few_patterns_per_segment_and_none_of_the_whole_body(trial, patterns):
@@ -109,10 +109,10 @@ def test_another_posture_is_no_displacement(trial):
     q = [trial.motion.q[:40], trial.motion.q[60:100]]
     skin = skin_patterns(trial.skeleton, q)
     coefficients = drawn(skin[0], np.random.default_rng(2))
-    moved = [each.displaced(coefficients) for each in skin]
-    places = np.array([each.mean(axis=0) for each in moved])
-    rest = WithoutSkin.of([each - each.mean(axis=0) for each in moved], places, skin, [1.0, 1.0])
-    before, after = (np.abs(each[0] - each[1]).max() for each in (places, rest.displaced))
+    moved = [pattern.displaced(coefficients) for pattern in skin]
+    places = np.array([displaced.mean(axis=0) for displaced in moved])
+    rest = WithoutSkin.of([displaced - displaced.mean(axis=0) for displaced in moved], places, skin, [1.0, 1.0])
+    before, after = (np.abs(means[0] - means[1]).max() for means in (places, rest.displaced))
     assert after < 0.25 * before
 
 
@@ -143,7 +143,7 @@ def swung(skeleton, name: str) -> np.ndarray:
     return q
 
 
-def of(skeleton, side: str) -> np.ndarray:
+def markers_of_arm(skeleton, side: str) -> np.ndarray:
     return np.array([m.segment in (f"upper_arm{side}", f"forearm{side}") for m in skeleton.markers])
 
 
@@ -151,7 +151,7 @@ def test_the_girdle_carries_all_markers_of_the_arm_that_swings(skeleton):
     every = np.ones(len(skeleton.markers), dtype=bool)
     variance = girdle_variance(skeleton, swung(skeleton, "arm_flex_r"), every)
     expected = np.square(CLAVICLE_M * CLAVICLE_PER_ARM * np.sin(np.radians(20.0))) / 3.0
-    rhs = of(skeleton, "_r")
+    rhs = markers_of_arm(skeleton, "_r")
     assert variance[rhs] == pytest.approx(rhs.sum() * expected, rel=0.02)
     assert not variance[~rhs].any()
 
@@ -159,8 +159,8 @@ def test_the_girdle_carries_all_markers_of_the_arm_that_swings(skeleton):
 def test_markers_that_the_trial_lacks_do_not_count(skeleton):
     q, every = swung(skeleton, "arm_flex_r"), np.ones(len(skeleton.markers), dtype=bool)
     fewer = every.copy()
-    fewer[np.flatnonzero(of(skeleton, "_r"))[0]] = False
-    rhs = of(skeleton, "_r") & fewer
+    fewer[np.flatnonzero(markers_of_arm(skeleton, "_r"))[0]] = False
+    rhs = markers_of_arm(skeleton, "_r") & fewer
     ratio = girdle_variance(skeleton, q, fewer)[rhs] / girdle_variance(skeleton, q, every)[rhs]
     assert ratio == pytest.approx((rhs.sum()) / (rhs.sum() + 1.0))
 
@@ -181,4 +181,4 @@ def test_a_model_with_a_scapula_that_moves_has_its_own_girdle(skeleton):
     every = np.ones(len(other.markers), dtype=bool)
     assert not girdle_variance(other, swung(other, "arm_flex_r"), every).any()
     held = other.lock({"scapula_elevation_r": 0.0})
-    assert girdle_variance(held, swung(held, "arm_flex_r"), every)[of(held, "_r")].all()
+    assert girdle_variance(held, swung(held, "arm_flex_r"), every)[markers_of_arm(held, "_r")].all()

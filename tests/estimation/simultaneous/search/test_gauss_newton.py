@@ -28,7 +28,7 @@ def test_a_step_repeats_the_last_pair(seed, n):
 
 def test_without_pairs_the_known_quadratic_answers():
     known, rhs = spd(0, 4), np.arange(4.0)
-    answer = SecantPairs().step(rhs, lambda each: np.linalg.solve(known, each))
+    answer = SecantPairs().step(rhs, lambda vector: np.linalg.solve(known, vector))
     np.testing.assert_array_equal(answer, np.linalg.solve(known, rhs))
 
 
@@ -41,7 +41,7 @@ def test_it_finds_the_optimum_of_a_quadratic_that_is_known_badly():
     pairs, best = SecantPairs(), np.linalg.solve(true, rhs)
     for _ in range(8):
         left = rhs - true @ x
-        step = pairs.step(left, lambda each: each.copy())
+        step = pairs.step(left, lambda vector: vector.copy())
         step *= (left @ step) / (step @ true @ step)
         x, pairs = x + step, pairs.with_pair(step, true @ step, float(step @ step))
     assert np.linalg.norm(x - best) < 1e-6 * np.linalg.norm(best)

@@ -217,8 +217,8 @@ def test_trials_share_plates_by_name_and_the_clock():
     for k, foreign in ((0, "fourth"), (1, "first")):
         static_terms = pair.normal(k, coefficients[k], static).static
         for i, name in enumerate(pair.given.plates):
-            own = np.abs(static_terms[pair.layout[PLATES]][5 * i : 5 * i + 5]).max(axis=1)
-            assert (own == 0).all() if name == foreign else (own > 0).all(), (k, name)
+            by_plate = np.abs(static_terms[pair.layout[PLATES]][5 * i : 5 * i + 5]).max(axis=1)
+            assert (by_plate == 0).all() if name == foreign else (by_plate > 0).all(), (k, name)
         assert static_terms[pair.layout[CLOCK], pair.layout[CLOCK]].item() > 0
 
 
@@ -228,19 +228,19 @@ def test_displacements_move_the_markers_of_their_trial_only(problem, here):
     sd = np.linspace(0.0, 0.02, len(problem.skeleton.markers))
     displaced = replace(trial, displacement_sd_m=sd)
     pair = MapProblem(problem.skeleton, problem.prior, problem.calibration, [displaced, trial])
-    own = np.random.default_rng(0).normal(size=(len(sd), 3))
+    drawn = np.random.default_rng(0).normal(size=(len(sd), 3))
     parts = problem.layout[ZEROS], problem.layout[GAINS], problem.layout[BENDING]
     where = np.repeat([part.stop for part in parts], [part.stop - part.start for part in parts])
     same = np.insert(static, where, static[parts[0].start : parts[-1].stop])
     on_time = np.insert(same, [pair.layout[TRIAL_DELAYS].start] * 2, 0.0)
-    at = Point((coefficients, coefficients), on_time, (own.ravel(), np.zeros(own.size)))
+    at = Point((coefficients, coefficients), on_time, (drawn.ravel(), np.zeros(drawn.size)))
     moved = pair.in_trial(0, at)[pair.layout[PLACES]].reshape(-1, 3) - on_time[pair.layout[PLACES]].reshape(-1, 3)
-    np.testing.assert_allclose(moved, sd[:, None] * own, atol=1e-15)
+    np.testing.assert_allclose(moved, sd[:, None] * drawn, atol=1e-15)
     np.testing.assert_array_equal(pair.in_trial(1, at), on_time)
     together = pair.at(at)
     assert together.trials[1].gradient.cost == pytest.approx(problem.normal(0, coefficients, static).cost)
     expected = sum(trial.gradient.cost for trial in together.trials) + problem.prior_slope(static)[1]
-    assert together.slope.cost == pytest.approx(expected + 0.5 * np.square(own).sum())
+    assert together.slope.cost == pytest.approx(expected + 0.5 * np.square(drawn).sum())
 
 
 def test_a_frame_without_dynamics_says_nothing_about_the_body(problem, here):

@@ -64,7 +64,7 @@ def found(page, person, trial, bias_nm: float):
     calibration = CalibrationPrior({}, np.full(len(trial.skeleton.markers), 0.005), InstrumentPrior())
     prior, trials = literature_prior(person.literature), [observation(trial, bias_nm)]
     result = estimate_simultaneous(trial.skeleton, prior, calibration, trials, terms=(*TERMS, page["MomentBias"]))
-    return {one.plate: one for one in result.calibration if one.quantity == page["BIAS"]}
+    return {entry.plate: entry for entry in result.calibration if entry.quantity == page["BIAS"]}
 
 
 @pytest.mark.parametrize("bias_nm", [BIAS_NM, 0.0])

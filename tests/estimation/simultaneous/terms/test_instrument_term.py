@@ -62,10 +62,10 @@ def test_only_contacts_of_the_incomplete_plate_have_parts_and_only_in_measured_f
 
 def test_gain_of_an_incomplete_plate_stays_nominal(problem):
     layout, complete = problem.layout, small_problem().layout
-    sds = [[one.sd for one in each.error_priors.individual] for each in (layout, complete)]
+    sds = [[prior.sd for prior in priors.error_priors.individual] for priors in (layout, complete)]
     for name, at in ((PLATES, 5 + 2), (GAINS, 1)):
-        own, other = (each[layout[name].start - layout.errors.start + at] for each in sds)
-        assert own <= other
+        incomplete, other = (sd[layout[name].start - layout.errors.start + at] for sd in sds)
+        assert incomplete <= other
         assert layout.error_priors.individual[layout[name].start - layout.errors.start + at].fault_probability == 0.0
 
 
@@ -76,12 +76,12 @@ def test_derivatives_by_missing_loads_are_those_of_the_cost(problem):
     exact = problem.gradient(0, coefficients[0], static)
     normal = problem.normal(0, coefficients[0], static)
     np.testing.assert_allclose(normal.static_rhs[at], exact.static_rhs[at], rtol=1e-6)
-    for one in at:
+    for place in at:
         costs = []
         for sign in (-1.0, 1.0):
             moved = static.copy()
-            moved[one] += sign * STEP
+            moved[place] += sign * STEP
             costs.append(problem.gradient(0, coefficients[0], moved).cost)
         slope = (costs[1] - costs[0]) / (2.0 * STEP)
-        assert -exact.static_rhs[one] == pytest.approx(slope, rel=1e-5, abs=1e-3)
+        assert -exact.static_rhs[place] == pytest.approx(slope, rel=1e-5, abs=1e-3)
         assert slope != 0.0

@@ -21,22 +21,22 @@ def terms():
     return rows.T @ rows, rng.normal(size=SIZE), elsewhere, np.array([0.5, 1.0, 0.0, 0.0, 2.0, 0.3]), rng.normal(size=6)
 
 
-def together(information, rhs, elsewhere, sd, own):
+def together(information, rhs, elsewhere, sd, offsets):
     """Normal equations on static unknowns and displacements (in prior deviations), from x in the trial = s + sd u."""
     chain = np.hstack([np.eye(SIZE), np.zeros((SIZE, 6))])
     chain[PLACES, SIZE:] = np.diag(sd)
     whole = chain.T @ information @ chain
     whole[:SIZE, :SIZE] += elsewhere
     whole[SIZE:, SIZE:] += np.eye(6)
-    return whole, chain.T @ rhs - np.concatenate([np.zeros(SIZE), own]), chain
+    return whole, chain.T @ rhs - np.concatenate([np.zeros(SIZE), offsets]), chain
 
 
 def test_eliminated_is_what_the_whole_system_gives(terms):
-    information, rhs, elsewhere, sd, own = terms
-    whole, both, _ = together(information, rhs, elsewhere, sd, own)
+    information, rhs, elsewhere, sd, offsets = terms
+    whole, both, _ = together(information, rhs, elsewhere, sd, offsets)
     expected = np.linalg.solve(whole, both)
     displaced = Displaced.of(information, PLACES, sd)
-    on_displacements = sd * rhs[PLACES] - own
+    on_displacements = sd * rhs[PLACES] - offsets
     step = np.linalg.solve(displaced.information + elsewhere, rhs - on_displacements @ displaced.gain)
     np.testing.assert_allclose(step, expected[:SIZE], rtol=1e-10)
     found = displaced.rest(on_displacements) - displaced.gain @ step
@@ -45,8 +45,8 @@ def test_eliminated_is_what_the_whole_system_gives(terms):
 
 
 def test_in_the_trial_unknowns_are_known_as_the_whole_system_says(terms):
-    information, rhs, elsewhere, sd, own = terms
-    whole, _, chain = together(information, rhs, elsewhere, sd, own)
+    information, rhs, elsewhere, sd, offsets = terms
+    whole, _, chain = together(information, rhs, elsewhere, sd, offsets)
     expected = chain @ np.linalg.inv(whole) @ chain.T
     in_trial = information + as_displaced(elsewhere, PLACES, sd)
     np.testing.assert_allclose(np.linalg.inv(in_trial), expected, rtol=1e-9, atol=1e-12)

@@ -58,7 +58,7 @@ def test_derivatives_are_those_of_the_cost():
         there, back = coefficients.copy(), coefficients.copy()
         there[i, j] += step
         back[i, j] -= step
-        two = [normal_at(one, TimeBlock.whole(basis)) for one in (there, back)]
+        two = [normal_at(basis_, TimeBlock.whole(basis)) for basis_ in (there, back)]
         slope = (two[0].cost - two[1].cost) / (2 * step)
         assert slope == pytest.approx(-whole.rhs[i, j], rel=1e-5, abs=1e-3)
         bends = -(two[0].rhs - two[1].rhs)[i : i + 6] / (2 * step)
@@ -124,7 +124,7 @@ def test_kappa_takes_from_the_first_moment_of_the_trunk_only(problem):
     trunk = BendingTrunk.of(bsp, problem.prior.mass_kg)
     assert trunk is not None
     bent = trunk.bent(bsp, 0.5)
-    before, after = (each.dynamic_parameters().reshape(-1, 10) for each in (bsp, bent))
+    before, after = (body.dynamic_parameters().reshape(-1, 10) for body in (bsp, bent))
     assert after[trunk.row, 2] == pytest.approx(before[trunk.row, 2] - 0.5)
     assert after[trunk.row, 0] == before[trunk.row, 0]
     others = np.arange(len(bsp.segments)) != trunk.row
@@ -135,11 +135,11 @@ def test_a_rod_that_bends_loses_as_much_inertia_as_kappa_says():
     """Points of a uniform rod go down by what a load along it displaces them, which grows with their height squared."""
     height, mass_kg, kappa = (np.arange(1000) + 0.5) / 1000 * 0.6, 30.0 / 1000, 0.01
     down = np.square(height) * kappa / (mass_kg * np.square(height).sum())
-    straight, bent = (np.square(each).sum() * mass_kg for each in (height, height - down))
+    straight, bent = (np.square(heights).sum() * mass_kg for heights in (height, height - down))
     moment = straight - 30.0 * 0.3**2  # about the centre of mass
     inertia = np.diag([moment, 0.01, moment])[None]
     rod = BodySegmentParameters(("torso",), np.array([30.0]), np.array([[0.0, 0.3, 0.0]]), inertia)
-    before, after = (one.dynamic_parameters() for one in (rod, BendingTrunk.of(rod, 60.0).bent(rod, kappa)))
+    before, after = (body.dynamic_parameters() for body in (rod, BendingTrunk.of(rod, 60.0).bent(rod, kappa)))
     assert (after - before)[[4, 9]] == pytest.approx(bent - straight, rel=0.01)
 
 

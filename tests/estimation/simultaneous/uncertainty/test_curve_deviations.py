@@ -125,24 +125,24 @@ def dense_derivatives(
     ground[..., problem.layout.errors] = by.ground
     speed, value = motion[1][:, problem.moving][..., None], by.value[..., None]
     more = np.broadcast_to(grown, (d, every.q.shape[1], 1))
-    by_place, by_rate, by_acceleration = (more[:, :c] * each for each in (by.q, by.qd, by.qdd))
+    by_place, by_rate, by_acceleration = (more[:, :c] * derivative for derivative in (by.q, by.qd, by.qdd))
     orders = {
         "coordinates": (same, nothing, nothing, zero),
         "moments": (by_place, by_rate, by_acceleration, still),
         "powers": (speed * by_place, speed * by_rate + value * same, speed * by_acceleration, speed * still),
         "ground_forces": (*(np.zeros((d, 6, c)),) * 3, ground),
-        "joints": (*(more[:, c:] * each for each in (three.q, three.qd, three.qdd)), three.static),
+        "joints": (*(more[:, c:] * derivative for derivative in (three.q, three.qd, three.qdd)), three.static),
     }
     result = {}
-    for name, (*moved, own) in orders.items():
-        wide = own.shape[1]
+    for name, (*moved, fixed) in orders.items():
+        wide = fixed.shape[1]
         through = np.zeros((d, wide, size, c))
         for row, t in enumerate(frames):
             for a, spline in enumerate(basis.active[t]):
                 parts = zip(basis.values[:, t, a] * shares, moved, strict=True)
-                through[row, :, spline] = sum(each * part[row] for each, part in parts)
-        rest = np.zeros((d, wide, problem.layout.size - own.shape[2]))
-        result[name] = np.concatenate([through.reshape(d, wide, size * c), own, rest], axis=2)
+                through[row, :, spline] = sum(derivative * part[row] for derivative, part in parts)
+        rest = np.zeros((d, wide, problem.layout.size - fixed.shape[2]))
+        result[name] = np.concatenate([through.reshape(d, wide, size * c), fixed, rest], axis=2)
     return result
 
 
@@ -224,13 +224,17 @@ def test_unknowns_that_are_left_out_of_the_vector_count_in_all_curves(estimate):
     more = 10.0 * root @ rng.normal(size=(layout.size, 2)) / np.sqrt(layout.size)
     more[problem.loads.delay_unknowns(0)] = 0.0  # their derivatives depend on their own deviation
     here = problem, 0, coefficients, static, part
-    without, with_more = (curve_deviations(*here, each, np.ones(3)) for each in (root, np.hstack([more, root])))
+    without, with_more = (
+        curve_deviations(*here, unknowns_root, np.ones(3)) for unknowns_root in (root, np.hstack([more, root]))
+    )
     normal = problem.normal(0, coefficients, static)
     followed = -np.linalg.solve(dense_band(normal.band), normal.border.reshape(n, -1) @ more)
     late = delay_sd_s(problem, root @ root.T)
     for name, by in dense_derivatives(problem, coefficients, static, delay_sd_s=late).items():
         change = np.square(by @ np.concatenate([followed, more])).sum(axis=-1)
-        before, after = (np.square(getattr(each, name)).reshape(change.shape) for each in (without, with_more))
+        before, after = (
+            np.square(getattr(deviations, name)).reshape(change.shape) for deviations in (without, with_more)
+        )
         assert not change.size or (change > 0.1 * before).any(), name
         np.testing.assert_allclose(after, before + change, rtol=1e-3, atol=1e-6 * change.max(initial=0.0), err_msg=name)
 
@@ -262,7 +266,9 @@ def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate, noise,
     covariance = inverse(information)
     model = GaussNewton.of(pair, here).under(gaussian)
     ended = Ended(here.point, here, gaussian, True, 1, (0.0, 0.0))
-    none = Mode(np.zeros(pair.layout.size), tuple(np.zeros_like(one) for one in here.point.coefficients))
+    none = Mode(
+        np.zeros(pair.layout.size), tuple(np.zeros_like(coefficient) for coefficient in here.point.coefficients)
+    )
     alike = OfPhases(static, np.zeros((len(static),) * 2), (pair, pair), (here.point, here.point))
     uncertain = _roots_in_trials(pair, ended, model), np.zeros((pair.layout.size, 0))
     static_covariance, sds, _ = _uncertainty(pair, ended, model, uncertain, [none], alike)
@@ -313,19 +319,19 @@ def dense_pair(pair, here, gaussian) -> tuple[list[np.ndarray], np.ndarray, np.n
     rhs[places] += gaussian.pull - gaussian.precision @ point.static[places]
     chains = []
     for k, normal in enumerate(normals):
-        own, moving = slice(s + k * wide, s + (k + 1) * wide), slice(ends[k] - sizes[k], ends[k])
+        columns, moving = slice(s + k * wide, s + (k + 1) * wide), slice(ends[k] - sizes[k], ends[k])
         chain = np.zeros((s, ends[-1]))
         chain[:, :s] = np.eye(s)
-        chain[pair.layout[PLACES], own] = np.diag(pair.displaced_sd[k])
+        chain[pair.layout[PLACES], columns] = np.diag(pair.displaced_sd[k])
         across = normal.border.reshape(-1, s) @ chain
         information += chain.T @ normal.static @ chain
         information[moving] += across
         information[:, moving] += across.T
         information[moving, moving] += dense_band(normal.band)
-        information[own, own] += np.eye(wide)
+        information[columns, columns] += np.eye(wide)
         rhs += chain.T @ normal.static_rhs
         rhs[moving] += normal.rhs.ravel()
-        rhs[own] -= point.displaced[k]
+        rhs[columns] -= point.displaced[k]
         chains.append(chain)
     return chains, information, rhs
 

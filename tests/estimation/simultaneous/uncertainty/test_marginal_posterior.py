@@ -34,7 +34,8 @@ def test_what_does_not_move_is_averaged_and_the_distance_is_in_its_covariance(pr
 def test_other_phases_begin_with_the_same_motion(problem, here):
     found = OfPhases.of(problem, here, lambda other, begin: begin)
     motions = [
-        p.bases[0].evaluate(each.coefficients[0])[0] for p, each in zip(found.problems, found.points, strict=True)
+        p.bases[0].evaluate(found_point.coefficients[0])[0]
+        for p, found_point in zip(found.problems, found.points, strict=True)
     ]
     assert found.problems[1].bases[0].knots[0] < problem.bases[0].knots[0]
     assert np.sqrt(np.mean(np.square(motions[1] - motions[0]))) < 0.5 * np.sqrt(np.mean(np.square(motions[0])))

@@ -55,8 +55,8 @@ def model_of(problem, here: Quadratic, gaussian: GaussianPrior):
 
 def found(priors) -> tuple[CostProfile, np.ndarray]:
     """And the posterior covariance of everything."""
-    one, n = problem(priors), len(priors)
-    gaussian, here = GaussianPrior.of(one.layout.error_priors), Quadratic(information(n, 2.0))
+    posed, n = problem(priors), len(priors)
+    gaussian, here = GaussianPrior.of(posed.layout.error_priors), Quadratic(information(n, 2.0))
 
     def search(model, slope, held: GaussianPrior) -> tuple[np.ndarray, float]:
         whole, rhs = information(n, 1.0), np.append(np.full(n, SHOWN_S / SD_S**2), 0.0)
@@ -66,8 +66,8 @@ def found(priors) -> tuple[CostProfile, np.ndarray]:
         return static, cost(static, n) + held.cost(static[:n])
 
     place = Place(search(None, None, gaussian)[0])
-    profile = CostProfile.of(model_of(one, here, gaussian), gaussian, place, search)
-    root = model_of(one, profile.here, profile.instruments).static.root_of_covariance()
+    profile = CostProfile.of(model_of(posed, here, gaussian), gaussian, place, search)
+    root = model_of(posed, profile.here, profile.instruments).static.root_of_covariance()
     return profile, root @ root.T
 
 
@@ -107,9 +107,9 @@ def test_what_one_trial_shows_may_be_the_clock_s_or_its_own():
 
 
 def test_where_nothing_is_to_be_profiled_all_is_left_as_it_is():
-    one = problem([CLOCK])
-    known = SimpleNamespace(**{**vars(one), "profiled": list})
-    gaussian, here = GaussianPrior.of(one.layout.error_priors), Quadratic(information(1, 2.0))
+    posed = problem([CLOCK])
+    known = SimpleNamespace(**{**vars(posed), "profiled": list})
+    gaussian, here = GaussianPrior.of(posed.layout.error_priors), Quadratic(information(1, 2.0))
     place = Place(np.zeros(2))
     model = model_of(known, here, gaussian)
     profile = CostProfile.of(model, gaussian, place, lambda model, slope, held: pytest.fail("searched"))

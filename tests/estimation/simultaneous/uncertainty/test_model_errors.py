@@ -42,9 +42,9 @@ def standing():
     still = Motion(*np.zeros((3, n, c)))
     loads = np.random.default_rng(0).normal(0.0, 1.0, (n, 2, 6)) * [100.0, 700.0, 100.0, 50.0, 20.0, 50.0]
     joints = body_joints(walked.skeleton)
-    own = joint_moments(walked.skeleton, walked.bsp, still, loads)
+    moments = joint_moments(walked.skeleton, walked.bsp, still, loads)
     wrenches = joint_wrenches(walked.skeleton, walked.bsp, still, loads, joints)
-    return walked.skeleton, joints, own, wrenches
+    return walked.skeleton, joints, moments, wrenches
 
 
 def unit(vector):
@@ -70,18 +70,24 @@ def displaced(skeleton, joints, wrenches, centre_m, axis_rad):
     for joint in joints:
         if joint.side:
             hip, knee, ankle = (places[f"{name}_{joint.side}"] for name in ("hip", "knee", "ankle"))
-            thigh_name = next(one.child for one in joints if (one.name, one.side) == ("Hip", joint.side))
-            shank_name = next(one.child for one in joints if (one.name, one.side) == ("Knee", joint.side))
+            thigh_name = next(
+                candidate.child for candidate in joints if (candidate.name, candidate.side) == ("Hip", joint.side)
+            )
+            shank_name = next(
+                candidate.child for candidate in joints if (candidate.name, candidate.side) == ("Knee", joint.side)
+            )
             thigh, shank = turned[thigh_name], turned[shank_name]
             right = np.cos(axis_rad) * thigh[:, 2] + np.sin(axis_rad) * thigh[:, 0]
-            own = turned | {thigh_name: frame(hip - knee, right), shank_name: frame(knee - ankle, shank[:, 2])}
+            segment_axes = turned | {thigh_name: frame(hip - knee, right), shank_name: frame(knee - ankle, shank[:, 2])}
         else:
-            own = turned
+            segment_axes = turned
         wrench = wrenches[joint]
         moved = wrench[:, 3:] + np.cross(centres[joint.label] - places[joint.label], wrench[:, :3])
-        axes = joint_axes(own[joint.parent][None], own[joint.child][None], long_axis=joint.long_axis)[0]
+        axes = joint_axes(segment_axes[joint.parent][None], segment_axes[joint.child][None], long_axis=joint.long_axis)[
+            0
+        ]
         moments = component_signs(joint) * (moved @ axes.T)
-        result.append(np.stack([moments, wrench[:, :3] @ own[joint.child]], axis=1))
+        result.append(np.stack([moments, wrench[:, :3] @ segment_axes[joint.child]], axis=1))
     return np.stack(result, axis=1)
 
 
@@ -97,12 +103,12 @@ class Drawn:
 
 @pytest.mark.parametrize("scale", [(SMALL, 0.0), (0.0, SMALL)])
 def test_moments_change_as_those_about_the_displaced_knee(standing, scale):
-    skeleton, joints, own, wrenches = standing
+    skeleton, joints, moments, wrenches = standing
     before, after = (
         displaced(skeleton, joints, wrenches, s[0] * CENTRE_SD_M, s[1] * AXIS_SD_RAD) for s in ((0.0, 0.0), scale)
     )
-    drawn = with_drawn_knees(skeleton, joints, own, Drawn(*scale))
-    found = np.stack([drawn.moments - own.moments, drawn.forces - own.forces], axis=2)
+    drawn = with_drawn_knees(skeleton, joints, moments, Drawn(*scale))
+    found = np.stack([drawn.moments - moments.moments, drawn.forces - moments.forces], axis=2)
     expected = after - before
     size = np.abs(expected).max(axis=(0, 1, 3))
     assert size.min() > 0.0
@@ -113,29 +119,30 @@ def test_moments_change_as_those_about_the_displaced_knee(standing, scale):
 
 
 def test_variances_are_those_of_the_displacements(standing):
-    skeleton, joints, own, _ = standing
+    skeleton, joints, known_moments, _ = standing
     signs = np.array([component_signs(joint) for joint in joints])
-    both = np.stack([signs * own.moments, own.forces], axis=2)
+    both = np.stack([signs * known_moments.moments, known_moments.forces], axis=2)
     found = knee_geometry(skeleton, joints, both.reshape(len(both), -1)).reshape(both.shape)
-    changes = [with_drawn_knees(skeleton, joints, own, Drawn(*scale)) for scale in np.eye(2)]
-    moments = sum(np.square(one.moments - own.moments) for one in changes)
-    forces = sum(np.square(one.forces - own.forces) for one in changes)
+    changes = [with_drawn_knees(skeleton, joints, known_moments, Drawn(*scale)) for scale in np.eye(2)]
+    moments = sum(np.square(change.moments - known_moments.moments) for change in changes)
+    forces = sum(np.square(change.forces - known_moments.forces) for change in changes)
     np.testing.assert_allclose(found, np.stack([moments, forces], axis=2), rtol=1e-9, atol=1e-12)
     hip, knee = (next(k for k, joint in enumerate(joints) if joint.label == name) for name in ("hip_r", "knee_r"))
     assert found[:, hip, 0, 2].min() > 0.0
     np.testing.assert_allclose(
         found[:, knee, 0, 1],
-        np.square(CENTRE_SD_M * own.forces[:, knee, 1]) + np.square(AXIS_SD_RAD * own.moments[:, knee, 0]),
+        np.square(CENTRE_SD_M * known_moments.forces[:, knee, 1])
+        + np.square(AXIS_SD_RAD * known_moments.moments[:, knee, 0]),
     )
 
 
 def test_back_is_as_certain_as_before(standing):
-    skeleton, joints, own, _ = standing
+    skeleton, joints, moments, _ = standing
     lumbar = [k for k, joint in enumerate(joints) if joint.name == "Lumbar"]
     random = np.random.default_rng(1)
-    drawn = with_drawn_knees(skeleton, joints, own, random)
-    np.testing.assert_array_equal(drawn.moments[:, lumbar], own.moments[:, lumbar])
-    assert np.abs(drawn.moments - own.moments).max() > 0.1
+    drawn = with_drawn_knees(skeleton, joints, moments, random)
+    np.testing.assert_array_equal(drawn.moments[:, lumbar], moments.moments[:, lumbar])
+    assert np.abs(drawn.moments - moments.moments).max() > 0.1
 
 
 TIME = np.arange(200) / 100.0
@@ -248,7 +255,7 @@ def expected(trial) -> np.ndarray:
     """Errors as the estimate expects them, m."""
     process, (n, m, _) = ErrorProcess.double_over(FRAMES_ALIKE), trial.markers.positions.shape
     fresh = np.random.default_rng(0).normal(0.0, np.sqrt(process.new), (500 + n, m, 3))
-    return SD_M * lfilter([1.0], [1.0, *(-each for each in process.of_before)], fresh, axis=0)[500:]
+    return SD_M * lfilter([1.0], [1.0, *(-coefficient for coefficient in process.of_before)], fresh, axis=0)[500:]
 
 
 def found(trial: SyntheticTrial, errors: np.ndarray) -> np.ndarray:

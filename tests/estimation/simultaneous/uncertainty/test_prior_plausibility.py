@@ -82,4 +82,4 @@ def test_where_no_side_is_heavier_segments_of_the_model_are_named():
 def test_sides_that_differ_as_peoples_do_are_nothing():
     rng = np.random.default_rng(0)
     found = [mahalanobis_distance(PRIOR, PRIOR.draw(rng), 1e-6 * PRIOR.covariance).one_sided for _ in range(200)]
-    assert sum(one is not None for one in found) <= 4
+    assert sum(finding is not None for finding in found) <= 4

@@ -12,10 +12,10 @@ OVERRULED = '[diagnostics]\nignore = ["M102", "R40"]\nwaive = ["P244"]\n'
 
 def test_findings_are_overruled_for_person_trial_and_study(folder):
     text = GOOD.replace("[settings]", '[trial.diagnostics]\nwaive = ["P21"]\n\n[settings]')
-    plain, own = read(folder, text), read(folder, text + OVERRULED)
+    plain, overruled = read(folder, text), read(folder, text + OVERRULED)
     assert plain.diagnostics.overrule == Overrule()
-    assert own.diagnostics.overrule == Overrule(waive=("P244",), ignore=("M102", "R40"))
-    assert [trial.diagnostics.overrule for trial in own.trials] == [Overrule(), Overrule(waive=("P21",))]
+    assert overruled.diagnostics.overrule == Overrule(waive=("P244",), ignore=("M102", "R40"))
+    assert [trial.diagnostics.overrule for trial in overruled.trials] == [Overrule(), Overrule(waive=("P21",))]
     (folder.parent / STUDY_FILE).write_text('[diagnostics]\nignore = ["P268"]\n', encoding="utf-8")
     both = read(folder, text + OVERRULED).diagnostics.overrule
     assert both == Overrule(waive=("P244",), ignore=("P268", "M102", "R40"))

@@ -46,7 +46,7 @@ def test_the_signs_of_the_report(folder):
 
 def test_the_task_of_a_trial(folder):
     result = read(folder, changed('name = "second"', 'name = "second"\ntask = "turn"'))
-    assert [one.task for one in result.trials] == [None, "turn"]
+    assert [trial.task for trial in result.trials] == [None, "turn"]
     with pytest.raises(FileError, match="task"):
         read(folder, changed('name = "second"', 'task = "dance"'))
 
