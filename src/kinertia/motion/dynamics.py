@@ -129,10 +129,10 @@ def root_regressor(skeleton: Skeleton, segments: Sequence[str], motion: Motion) 
 def segment_loads(skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion) -> np.ndarray:
     """Compute the load (s, n, 6) that each segment and what it carries require, N and N m about the root's centre."""
     parameters = np.zeros((len(skeleton.segments), 10))
-    for own in (bsp, skeleton.carried):
-        if own is not None:
-            rows = [skeleton.segments.index(segment) for segment in own.segments]
-            np.add.at(parameters, rows, own.dynamic_parameters().reshape(-1, 10))
+    for bodies in (bsp, skeleton.carried):
+        if bodies is not None:
+            rows = [skeleton.segments.index(segment) for segment in bodies.segments]
+            np.add.at(parameters, rows, bodies.dynamic_parameters().reshape(-1, 10))
     about = np.ascontiguousarray(skeleton.root.centre(motion.q))
     return required_loads(skeleton.tree, skeleton.gravity_m_s2, parameters, *axis_motion(skeleton, motion), about)
 
@@ -207,7 +207,7 @@ def required_loads(
     result = np.zeros((segments, n, 6))
     frame = empty_frame(count, gravity_m_s2)
     rotation, translation = np.empty((segments, 3, 3)), np.empty((segments, 3))
-    w, e, b, own, load = np.empty(3), np.empty(3), np.empty(3), np.empty((6, 10)), np.empty(6)
+    w, e, b, in_body, load = np.empty(3), np.empty(3), np.empty(3), np.empty((6, 10)), np.empty(6)
     for k in range(n):
         move(tree, x[k], v[k], a[k], frame)
         place_segments(tree, frame.rotation, frame.translation, rotation, translation)
@@ -216,22 +216,22 @@ def required_loads(
             if last_axis < 0:
                 continue
             in_segment(frame.velocity[last_axis], frame.acceleration[last_axis], rotation[s], translation[s], w, e, b)
-            own_regressor(w, e, b, own)
+            own_regressor(w, e, b, in_body)
             for r in range(6):
                 load[r] = 0.0
                 for c in range(10):
-                    load[r] += own[r, c] * parameters[s, c]
+                    load[r] += in_body[r, c] * parameters[s, c]
             _load_to_ground(rotation[s], translation[s], about[k], load, result[s, k])
     return result
 
 
 @part
-def _load_to_ground(rotation: np.ndarray, at: np.ndarray, about: np.ndarray, own: np.ndarray, out: np.ndarray) -> None:
+def _load_to_ground(rotation: np.ndarray, at: np.ndarray, about: np.ndarray, load: np.ndarray, out: np.ndarray) -> None:
     """Write a load (6,) in ground axes and about another point to `out`; the segment's origin is at `at`."""
     x, y, z = at[0] - about[0], at[1] - about[1], at[2] - about[2]
     for r in range(3):
-        out[r] = rotation[r, 0] * own[0] + rotation[r, 1] * own[1] + rotation[r, 2] * own[2]
-        out[3 + r] = rotation[r, 0] * own[3] + rotation[r, 1] * own[4] + rotation[r, 2] * own[5]
+        out[r] = rotation[r, 0] * load[0] + rotation[r, 1] * load[1] + rotation[r, 2] * load[2]
+        out[3 + r] = rotation[r, 0] * load[3] + rotation[r, 1] * load[4] + rotation[r, 2] * load[5]
     out[3] += y * out[2] - z * out[1]
     out[4] += z * out[0] - x * out[2]
     out[5] += x * out[1] - y * out[0]

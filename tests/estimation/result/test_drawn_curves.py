@@ -22,9 +22,9 @@ def test_curves_of_several_draws(fit, source):
     angles, moments = found.angle(time), found.joint_moment(time)
     drawn = replace(fit, posterior=replace(fit.posterior, draws=draws))
     for place, number in enumerate(NUMBERS):
-        one = CurveSource(drawn_fit(drawn, number, source == "all").trials[0], "estimate")
-        np.testing.assert_allclose(angles[..., place], one.angle(time), rtol=1e-10, atol=1e-12)
-        np.testing.assert_allclose(moments[..., place], one.joint_moment(time), rtol=1e-10, atol=1e-9)
+        single_draw = CurveSource(drawn_fit(drawn, number, source == "all").trials[0], "estimate")
+        np.testing.assert_allclose(angles[..., place], single_draw.angle(time), rtol=1e-10, atol=1e-12)
+        np.testing.assert_allclose(moments[..., place], single_draw.joint_moment(time), rtol=1e-10, atol=1e-9)
     assert np.isfinite(moments).any()
     assert np.nanmax(np.ptp(moments, axis=3)) > 0.1
     assert (np.nanmax(np.ptp(angles, axis=2)) > 1e-4) == (source == "all")

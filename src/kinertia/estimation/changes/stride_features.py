@@ -196,7 +196,7 @@ class _Strides:
             time, whole = np.concatenate([stride.time for stride in of_trial]), (len(of_trial), len(PERCENT))
             angles, moments = np.degrees(source.angle(time)), source.joint_moment(time) / mass_kg
             count = angles.shape[2]
-            angles, moments = (each.reshape(*whole, -1, count) for each in (angles, moments))
+            angles, moments = (values.reshape(*whole, -1, count) for values in (angles, moments))
             for k, some in enumerate(columns):
                 rows += [(angles if is_angle else moments)[k, :, column] for is_angle, column in some]
         return np.array(rows).reshape(len(self.keys), len(PERCENT), -1).transpose(2, 0, 1)

@@ -44,7 +44,7 @@ class DrawnCurves:
         """
         k, curves = trial.kinematics, trial.joint_curves
         time, motions = drawn_motions(trial, draws, numbers)
-        angles = np.stack([each.q for each in motions], axis=2)
+        angles = np.stack([drawn_motion.q for drawn_motion in motions], axis=2)
         through = partial(through_angles, derivative=0)
         if curves is None:
             nothing = np.empty((len(time), 0, 3, len(numbers)))
@@ -54,8 +54,8 @@ class DrawnCurves:
         for place, (number, motion, (skeleton, bsp)) in enumerate(zip(numbers, motions, models, strict=True)):
             if place == 0 or not same:
                 foot_loads = drawn_reactions(trial.reactions, draws, number).at(time)
-            own = joint_loads(skeleton, bsp, motion, foot_loads, joints)
-            loads = replace(curves.joints["estimate"], moments=own[0], forces=own[1])
+            moments_and_forces = joint_loads(skeleton, bsp, motion, foot_loads, joints)
+            loads = replace(curves.joints["estimate"], moments=moments_and_forces[0], forces=moments_and_forces[1])
             if knees:
                 loads = with_drawn_knees(skeleton, joints, loads, drawn_knees(number))
             moments[..., place] = loads.moments
@@ -75,4 +75,4 @@ def _shown(curves: JointCurves) -> np.ndarray:
 def _same_loads(draws: TrialDraws, numbers: Sequence[int]) -> bool:
     """Return whether ground reactions are the same in all these draws."""
     departures = (draws.plates, draws.delay_s, draws.impact)
-    return not any(each[list(numbers)].any() for each in departures)
+    return not any(departure[list(numbers)].any() for departure in departures)

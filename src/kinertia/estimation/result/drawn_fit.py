@@ -124,7 +124,7 @@ def drawn_motions(trial: TrialFit, draws: TrialDraws, numbers: Sequence[int]) ->
     moved = BSpline(draws.knots, some.transpose(1, 0, 2).astype(float), _DEGREE)(time)
     spline = interpolate(time, trajectory[:, None] + moved)
     orders = [np.ascontiguousarray(spline(time, order).swapaxes(0, 1)) for order in range(3)]
-    motions = [Motion(*each) for each in zip(*orders, strict=True)]
+    motions = [Motion(*orders_of_draw) for orders_of_draw in zip(*orders, strict=True)]
     return time, motions if len(some) == len(numbers) else motions * len(numbers)
 
 
