@@ -131,7 +131,7 @@ def person_page(
         rows=rows,
         use=USE,
         keys={"condition": CONDITION, "start": START, "end": END},
-        own=trial_fields(dict(content), [row.name for row in rows], typed or {}),
+        trial_fields=trial_fields(dict(content), [row.name for row in rows], typed or {}),
         conditions=conditions(dict(content)),
         applied=applied(person, dict(content)),
         uses={row.name: (typed or {}).get(USE + row.name, row.use) for row in rows},
