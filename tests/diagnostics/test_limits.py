@@ -69,7 +69,7 @@ NOT_TRIED = {
     "P236": "best misread",
     "P241": "far",
     "P242": "wrong",
-    "P243": "begin end far offset",
+    "P243": "back begin end far forward offset",
     "P244": "far",
     "P266": "lever_arm",
     "P272": "loading middle",

@@ -12,7 +12,7 @@ from kinertia.trial.data import Markers
 from kinertia.trial.ground_contact import centre_of_pressure
 from kinertia.trial.sampled_data import runs
 from loads_and_feet import context_of, doubted, error_of, feet_of, on_one_plate, place_findings
-from recordings import QUICK_WALKS, RUNS, SQUATS, WALKS, slow_beside
+from recordings import NEEDS_MEASURED, QUICK_WALKS, RUNS, SQUATS, WALKS, slow_beside
 from walk_on_plates import ALL_STEPS
 from walk_on_plates import FEET as SIMPLE_FEET
 from walk_on_plates import walk as simple_walk
@@ -96,6 +96,53 @@ def test_offsets_along_the_walk(name, walk, offset_m):
     assert "P243" in [finding.code for finding in found if finding.is_open]
     along = [finding.evidence["offset_m"].value for finding in found if "begin_m" in finding.evidence]
     assert all(np.sign(offset) == np.sign(offset_m * direction(recording)) for offset in along)
+
+
+STATURES_M = {"gait2354": 1.803, "plug-in gait a": 1.61}
+
+
+def of_one_foot(recording, feet, height_m):
+    """Its right step alone on plates: no other foot shows where the plates are."""
+    contacts = [one for one in context_of(recording, feet, height_m=height_m).contacts if one.foot == 1]
+    (start_s, end_s) = contacts[0].start_s, contacts[0].end_s
+    plates = recording.plates
+    kept = ((plates.time > start_s - 0.02) & (plates.time < end_s + 0.02))[:, None, None]
+    kept = kept & (np.arange(len(plates.names)) == contacts[0].plate)[None, :, None]
+    return replace(recording, plates=replace(plates, force=plates.force * kept, moment=plates.moment * kept))
+
+
+@pytest.mark.parametrize("name", [name for name in STATURES_M if name in WALKS])
+@pytest.mark.parametrize("one_foot", [False, True])
+def test_offsets_of_50_mm_along_the_walk(name, recording_of, one_foot):
+    """Loads then lie farther back, or forward, than feet of this person are long; on one plate with one step, too."""
+    recording, height_m = recording_of(*WALKS[name]), STATURES_M[name]
+    feet = feet_of(recording)
+    recording = of_one_foot(recording, feet, height_m) if one_foot else recording
+    assert "P243" not in doubted(recording, feet, height_m=height_m)
+    for offset_m in (0.05, -0.05):
+        found = place_findings(moved(recording, (offset_m, 0.0, 0.0)), feet, height_m=height_m)
+        (along,) = [one for one in found if one.code == "P243" and one.is_open]
+        assert np.size(along.evidence["offset_m"].value) == 2 or (
+            along.evidence["offset_m"].value == pytest.approx(offset_m * direction(recording), abs=0.025)
+        )
+
+
+@pytest.mark.skipif("gait2354" not in WALKS, reason=NEEDS_MEASURED)
+def test_how_far_loads_may_lie_along_feet(recording_of):
+    recording = recording_of(*WALKS["gait2354"])
+    feet = feet_of(recording)
+    recording = of_one_foot(recording, feet, 1.803)
+
+    def excess_m(offset_m):
+        found = place_findings(moved(recording, (offset_m, 0.0, 0.0)), feet, height_m=1.803)
+        return [one.evidence["offset_m"].value for one in found if one.code == "P243"]
+
+    (ahead,), (behind,) = excess_m(0.06), excess_m(-0.06)
+    assert not excess_m(0.06 - ahead + 0.0415)
+    assert excess_m(0.06 - ahead + 0.0425)
+    assert not excess_m(-0.06 - behind - 0.0255)
+    assert excess_m(-0.06 - behind - 0.0265)
+    assert not place_findings(moved(recording, (-0.06, 0.0, 0.0)), feet)
 
 
 def direction(recording):

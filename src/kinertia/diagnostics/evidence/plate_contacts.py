@@ -29,7 +29,7 @@ BETWEEN_M = 0.08
 """Distance from both feet beyond which most of a load of both at once (squats) lies, between them."""
 _MOSTLY_NEAR, _LEAST_SHARE = 0.7, 0.2
 """While one foot takes over from the other, the load is under neither."""
-_END = 0.05
+END_SHARE = 0.05
 _FITS_S, FITS_M = 0.03, 0.08
 """On fault-free trials loads begin and end within 25 ms of foot contact and foot off (RMS over all that the trial
 shows), under the foot."""
@@ -97,7 +97,12 @@ class PlateContact:
     def ends_m(self) -> tuple[float, float]:
         """How far the first twentieth of the load is in front of the heel, and the last one in front of the toes."""
         of_heel, of_toes = self.trajectory.beyond(self.time, self.place)
-        return _quantile(of_heel, self.weight, _END), _quantile(of_toes, self.weight, 1 - _END)
+        return _quantile(of_heel, self.weight, END_SHARE), _quantile(of_toes, self.weight, 1 - END_SHARE)
+
+    def ahead_m(self, shares: Sequence[float]) -> FloatArray:
+        """Return how far (k,) m in front of the heel loads act once these shares of the whole have acted."""
+        acted = np.cumsum(self.weight) / self.weight.sum()
+        return np.asarray(np.interp(shares, acted, self.trajectory.beyond(self.time, self.place)[0]))
 
 
 def contacts_of(
