@@ -177,18 +177,19 @@ def test_a_person_of_unknown_height_is_an_adult():
 
 
 @pytest.mark.parametrize(
-    ("values", "word"),
+    ("values", "word", "severity"),
     [
-        ({"age_years": 7.0}, "child"),
-        ({"age_years": 72.0}, "elderly"),
-        ({"mass_kg": 100.0}, "obese"),
-        ({"age_years": 72.0, "mass_kg": 100.0}, "obese"),
+        ({"age_years": 7.0}, "child", "INFO"),
+        ({"height_m": 1.2, "mass_kg": 25.0}, "child", "WARNING"),
+        ({"age_years": 72.0}, "elderly", "INFO"),
+        ({"mass_kg": 100.0}, "obese", "WARNING"),
+        ({"age_years": 72.0, "mass_kg": 100.0}, "obese", "WARNING"),
     ],
 )
-def test_age_and_build_choose_and_warn(values, word):
+def test_age_and_build_choose_and_warn_of_what_is_not_stated(values, word, severity):
     result = population_prior(PRIOR, subject(**values))
     (found,) = result.findings
-    assert (found.code, found.severity.name, found.evidence["population"].value) == ("S401", "WARNING", word)
+    assert (found.code, found.severity.name, found.evidence["population"].value) == ("S401", severity, word)
     assert result.prior.sd[0, 1] == pytest.approx(UNKNOWN_SPREAD * PRIOR.sd[0, 1])
 
 

@@ -31,6 +31,10 @@ def test_what_the_evidence_has_is_the_value():
     plates = proposed("P287", Where(trial="walk"), names=Quantity('"plate 1", "plate 2"'))
     assert plates[0] == Remedy("instruments", "plates", ["plate 1", "plate 2"])
     assert proposed("P216", Where(trial="walk")) == [Remedy("instruments", "zeroed", True)]
+    assert proposed("S401", population=Quantity("obese")) == [Remedy("subject", "population", "obese")]
+    advice = {"advice": Quantity("Let markers and joint centres move (--calibrate)")}
+    assert proposed("R304", Where(trial="walk"), **advice) == [Remedy("model", "calibrate", True)]
+    assert proposed("R304", Where(trial="walk"), advice=Quantity("Check all labels")) == []
 
 
 @pytest.mark.parametrize(
@@ -62,6 +66,8 @@ def test_markers_trials_and_the_static_trial_are_left_out():
     assert proposed("L202", Where(trial="walk"), Severity.ERROR) == [Remedy("trial", "", None, "walk")]
     assert proposed("L202", Where(trial="walk"), Severity.ERROR, {"walk": ()}) == [], "nothing would be left"
     assert proposed("L202", Where(trial="walk"), Severity.WARNING) == []
+    pair = Where(trial="walk", markers=("RANK", "LANK"))
+    assert proposed("L202", pair, Severity.WARNING) == [Remedy("trial", "leave_out", ["RANK", "LANK"], "walk")]
 
 
 def test_what_can_be_overruled_is_last():

@@ -245,10 +245,10 @@ def test_mass_is_needed_and_nothing_else(model, walk):
     assert (caught.value.field, caught.value.finding.code) == ("mass_kg", "S101")
 
 
-def test_somebody_old_is_warned_of_with_a_model_too(model, walk):
+def test_somebody_old_is_reported_with_a_model_too(model, walk):
     old = SUBJECT.model_copy(update={"age_years": 72.0})
     (found,) = of_code(prepare(old, model, [TrialInput(walk)]), "S401")
-    assert (found.severity, found.evidence["population"].value) == (Severity.WARNING, "elderly")
+    assert (found.severity, found.evidence["population"].value) == (Severity.INFO, "elderly")
 
 
 @pytest.mark.parametrize("factor", [0.0, -1.0])

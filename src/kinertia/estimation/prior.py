@@ -265,7 +265,7 @@ def updated(
 
 @dataclass(frozen=True)
 class Population:
-    """Population that the person belongs to, the reason, and whether the user stated it."""
+    """Population that the person belongs to, the reason, and whether it or the age that it follows from is stated."""
 
     name: str
     reason: str
@@ -315,20 +315,20 @@ def population_of(subject: Subject, body_kg: float | None = None) -> Population:
     """
     if subject.population is not None:
         return Population(subject.population, "the stated population", True)
-    return Population(*_by_age_and_build(subject, body_kg or subject.mass_kg), False)
+    return _by_age_and_build(subject, body_kg or subject.mass_kg)
 
 
-def _by_age_and_build(subject: Subject, mass_kg: float | None) -> tuple[str, str]:
+def _by_age_and_build(subject: Subject, mass_kg: float | None) -> Population:
     age, height_m = subject.age_years, subject.height_m
     if age is not None and age < GROWN_UP_YEARS:
-        return "child", f"an age of {age:g} years"
+        return Population("child", f"an age of {age:g} years", True)
     if mass_kg and height_m and mass_kg / height_m**2 >= OBESE_KG_M2:
-        return "obese", f"a body-mass index of {mass_kg / height_m**2:.1f} kg/m2"
+        return Population("obese", f"a body-mass index of {mass_kg / height_m**2:.1f} kg/m2", False)
     if age is None and height_m is not None and height_m < _SHORT_M:
-        return "child", f"a height of {height_m:g} m and no stated age"
+        return Population("child", f"a height of {height_m:g} m and no stated age", False)
     if age is not None and age >= OLD_YEARS:
-        return "elderly", f"an age of {age:g} years"
-    return "adult", "no evidence of another"
+        return Population("elderly", f"an age of {age:g} years", True)
+    return Population("adult", "no evidence of another", False)
 
 
 def _with_masses(prior: BspPrior, shares: dict[str, float]) -> BspPrior:

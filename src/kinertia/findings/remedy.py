@@ -104,6 +104,8 @@ def _proposed(name: str, alike: Sequence[Finding], windows: Mapping[str, Sequenc
         case "trial.leave_out":
             value = list(dict.fromkeys(label for finding in alike for label in finding.where.markers))
             known = bool(value)
+        case "model.calibrate":
+            value, known = True, "--calibrate" in alike[0].remedy
         case _:
             value = _of_evidence(alike[0], source or key)
             known = value is not None
@@ -127,12 +129,14 @@ def _rounded(span: Span) -> list[float]:
 
 
 def _of_evidence(finding: Finding, name: str) -> Any:
-    """Return the value of a piece of evidence: a number to four digits, `true`, or a list that is written as TOML."""
+    """Return the value of a piece of evidence: a number to four digits, `true`, a word, or a list written as TOML."""
     if name == "true":
         return True
     quantity = finding.evidence.get(name)
     if quantity is None:
         return None
+    if isinstance(quantity.value, str) and quantity.value.isalpha():
+        return quantity.value
     if isinstance(quantity.value, str):
         return tomllib.loads(f"value = [{quantity.value}]")["value"]
     return None if isinstance(quantity.value, tuple) else float(f"{quantity.value:.4g}")

@@ -19,6 +19,7 @@ WAIVE = Remedy("diagnostics", "waive", "P244", "walk")
 IGNORE = Remedy("diagnostics", "ignore", "S111")
 SETTINGS = (
     Remedy("subject", "mass_kg", 46.12),
+    Remedy("subject", "population", "child"),
     Remedy("model", "static"),
     Remedy("model", "window_s", [0.0, 0.1]),
     Remedy("trial", "", None, "walk"),
@@ -67,7 +68,7 @@ def test_a_remedy_is_applied_shown_and_undone(person, remedy):
 
 
 def test_what_is_written_is_what_a_user_would_type(person):
-    for remedy in (WAIVE, IGNORE, *SETTINGS[4:6]):
+    for remedy in (WAIVE, IGNORE, *SETTINGS[5:7]):
         apply(proposing(person, remedy), remedy.text, "a known fault")
     wanted = read_subject(person.subject)
     walk, other = sorted(wanted.trials, key=lambda trial: len(trial.name))

@@ -54,6 +54,10 @@ def _label(remedy: Remedy) -> str:
             return f"Leave {' and '.join(labels)} out of {remedy.trial}"
         case ("model", "static", _):
             return "Do without the static trial"
+        case ("model", "calibrate", _):
+            return "Let markers and joint centres of the model move"
+        case ("subject", "population", value):
+            return f"Confirm the population: {value}"
         case ("subject", key, float() as value):
             return f"Set {label_of(key).lower()} to {value:g}"
         case ("diagnostics", "waive", _):

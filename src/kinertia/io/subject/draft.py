@@ -123,7 +123,7 @@ def _markers_line(is_here: bool, preset: str, draft: MarkerSetDraft | None) -> s
     if is_here or (draft is not None and not draft.against):
         return _entry(Model, "markers", MARKER_SET)
     if draft is None:
-        return "# " + _entry(Model, "markers", preset or MARKER_SET)
+        return "# " + _entry(Model, "markers", preset or MARKER_SET, note=" (this one)" if preset else "")
     return f"# {_entry(Model, 'markers', MARKER_SET)}; {NOT_USED}{'; '.join(draft.against)}. Correct it first"
 
 
