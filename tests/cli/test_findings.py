@@ -6,13 +6,14 @@ from dataclasses import replace
 import pytest
 
 from command_line import run
-from found import UNEXPLAINED, ZERO
+from found import CORRECTED, UNEXPLAINED, UNUSABLE, WAIVED, ZERO
 from generic_static import recording, standing_positions
 from kinertia.cli.common import out
-from kinertia.cli.findings import next_commands, show_all
+from kinertia.cli.findings import next_commands, show_all, show_overview
 from kinertia.diagnostics.limits import with_limits
 from kinertia.errors import MarkerSetError, SubjectError
 from kinertia.findings.finding import finding
+from kinertia.findings.overview import Overview
 from kinertia.findings.quantity import Where
 from kinertia.findings.rule import all_rules, matching, rule
 from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
@@ -32,6 +33,21 @@ def test_verbose_shows_what_a_finding_explains_to_the_last_consequence_and_in_it
         ["explains", "walk", "P246"],
         ["WARNING", "run", "P213"],
     ]
+
+
+@pytest.mark.parametrize(
+    ("findings", "codes", "hidden"),
+    [
+        (UNUSABLE, ["R301", "P244", "M113"], "3 more and 1 assumption"),
+        ((*CORRECTED, ZERO, WAIVED), ["P244", "P213", "T214"], "1 more:"),
+    ],
+)
+def test_the_worst_three_are_shown_waived_errors_among_them(findings, codes, hidden):
+    with out.capture() as shown:
+        show_overview(Overview(findings, 0, 1), verbose=False)
+    lines = shown.get().splitlines()
+    assert [next(code for code in codes if code in line) for line in lines[1:4]] == codes
+    assert lines[4].startswith(hidden)
 
 
 COMMAND = "kinertia fit walk.c3d --static static.c3d"

@@ -38,6 +38,11 @@ def test_stances_have_their_times_and_those_cut_by_the_record_take_as_long_as_ot
     assert stances_of(cut)[2].start_s == pytest.approx(-0.4)
 
 
+def test_a_stance_cut_by_the_record_takes_as_long_as_the_median_of_whole_ones():
+    cut = trial([(0.3, 0.9), (1.2, 1.9), (2.8, 3.0)], [(0.6, 1.7)])
+    assert stances_of(cut)[2].end_s == pytest.approx(2.8 + 0.7)
+
+
 def test_contacts_of_plates_are_not_rounded_to_frames():
     fine = np.arange(0.0, 3.0, 0.001)
     force = np.zeros((len(fine), 2, 3))

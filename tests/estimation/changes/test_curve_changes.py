@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kinertia.estimation.changes.curve_changes import CurveChange, curve_changes, paired
+from kinertia.estimation.changes.curve_changes import CurveChange, curve_changes, paired, rows_of
 from kinertia.estimation.changes.stride_features import Rows
 from kinertia.motion.gait_cycle import PERCENT
 from kinertia.report.comparison.change_tables import curve_columns, curve_figures, joint_figure
@@ -18,7 +18,7 @@ def wavy(rng, sd, count):
     return sd / np.sqrt(3.0) * rng.standard_normal((count, len(SHAPES))) @ SHAPES
 
 
-def compared(seed, strides=4, change=1.0, measured_sd=0.01, stride_sd=0.02, contacts_sd=0.0):
+def conditions(seed, strides=4, change=1.0, measured_sd=0.01, stride_sd=0.02, contacts_sd=0.0):
     """One curve of both sides in two conditions, each stride with errors of its own and of all."""
     rng = np.random.default_rng(seed)
     rows = []
@@ -35,7 +35,22 @@ def compared(seed, strides=4, change=1.0, measured_sd=0.01, stride_sd=0.02, cont
         values = np.array(estimate)
         contacts = np.full((1, *values.shape), contacts_sd * second)
         rows.append(Rows(tuple(keys), values, {"all": np.swapaxes(drawn, 0, 1), "contacts": contacts}))
-    return list(curve_changes(*rows, paired))
+    return rows
+
+
+def compared(seed, *options, **more):
+    """What changed between two conditions; arguments as of `conditions`."""
+    return list(curve_changes(*conditions(seed, *options, **more), paired))
+
+
+def test_the_order_of_conditions_is_the_sign_of_the_change():
+    """Although one has twice as many strides as the other."""
+    before, after = conditions(0)
+    after = rows_of(after, np.array([True, True, False, False] * 2))
+    there, back = (next(curve_changes(*pair, paired)) for pair in ((before, after), (after, before)))
+    assert (there.strides, back.strides) == ((4, 2), (2, 4))
+    np.testing.assert_allclose(back.difference, -there.difference)
+    np.testing.assert_allclose(back.sd, there.sd)
 
 
 def test_an_error_of_contacts_widens_the_band():
