@@ -137,13 +137,29 @@ def _distances(steps: Sequence[PlateContact], place: Sequence[FloatArray], feet:
 
 
 def interchanged_plates(context: RecordingContext) -> Iterator[Hypothesis]:
-    """Report P241: loads that are under no foot at their own position, but under one at another plate's."""
+    """Report P241: loads that are under no foot at their own position, but under one at another plate's; those that
+    would else be of another person or a thing, too.
+    """
     plates, feet, contacts = context.plates, context.foot_trajectories, context.contacts
-    if plates is None or feet is None or len({contact.plate for contact in contacts}) < 2:
+    if context.stray_contacts and context.recorded_plates is not None and feet is not None:
+        every = [*contacts, *context.stray_contacts]
+        found = list(_interchanged_pair(context, context.recorded_plates, feet, every))
+        if found:
+            yield from found
+            return
+    if plates is None or feet is None:
         return
+    if max((contact.distance_m for contact in contacts), default=0.0) > FAR_M:
+        yield from _interchanged_pair(context, plates, feet, contacts) or _opposite(context, plates, feet)
+
+
+def _interchanged_pair(
+    context: RecordingContext, plates: PlateLoads, feet: Feet, contacts: Sequence[PlateContact]
+) -> list[Hypothesis]:
+    """Return the two plates, if any, whose interchange puts all these loads under feet."""
+    if len({contact.plate for contact in contacts}) < 2:
+        return []
     before = max(contact.distance_m for contact in contacts)
-    if before <= FAR_M:
-        return
     used = sorted({contact.plate for contact in contacts})
     middle = _middles(plates, used)
     tried = []
@@ -153,10 +169,7 @@ def interchanged_plates(context: RecordingContext) -> Iterator[Hypothesis]:
         moved = displaced(plates, by)
         tried.append((max(contact.distance_m for contact in contacts_of(moved, feet)), pair, moved))
     after, pair, moved = min(tried, key=lambda candidate: candidate[0])
-    if after > min(FAR_M / 2, before):
-        yield from _opposite(context, plates, feet)
-        return
-    yield _interchanged(context, pair, moved, before, after)
+    return [] if after > min(FAR_M / 2, before) else [_interchanged(context, pair, moved, before, after)]
 
 
 def _interchanged(
