@@ -110,6 +110,17 @@ def test_noise_is_of_the_announced_size(subject, trial):
     assert 0.003 < (study.walk.markers.positions - exact.walk.markers.positions).std() < 0.005
 
 
+def test_the_second_plate_reads_too_much_and_both_late(subject, trial):
+    exact = record(subject, trial, PERFECT, np.random.default_rng(7), RATIO).walk.plates
+    late = round(0.01 / (exact.time[1] - exact.time[0]))
+    noise = replace(PERFECT, gain=0.04, delay_s=0.01)
+    read = record(subject, trial, noise, np.random.default_rng(7), RATIO).walk.plates
+    factor = np.array([[1.0], [1.04]])
+    assert late > 1
+    for before, after in ((exact.force, read.force), (exact.moment, read.moment)):
+        np.testing.assert_allclose(after[late:], factor * before[:-late])
+
+
 def test_a_trial_without_whole_contacts_is_refused(subject):
     with pytest.raises(TrialError, match="two strides"):
         record(subject, walk(subject, 0.5), PERFECT, np.random.default_rng(0))

@@ -103,7 +103,7 @@ STATURES_M = {"gait2354": 1.803, "plug-in gait a": 1.61}
 
 def of_one_foot(recording, feet, height_m):
     """Its right step alone on plates: no other foot shows where the plates are."""
-    contacts = [one for one in context_of(recording, feet, height_m=height_m).contacts if one.foot == 1]
+    contacts = [contact for contact in context_of(recording, feet, height_m=height_m).contacts if contact.foot == 1]
     (start_s, end_s) = contacts[0].start_s, contacts[0].end_s
     plates = recording.plates
     kept = ((plates.time > start_s - 0.02) & (plates.time < end_s + 0.02))[:, None, None]
@@ -121,7 +121,7 @@ def test_offsets_of_50_mm_along_the_walk(name, recording_of, one_foot):
     assert "P243" not in doubted(recording, feet, height_m=height_m)
     for offset_m in (0.05, -0.05):
         found = place_findings(moved(recording, (offset_m, 0.0, 0.0)), feet, height_m=height_m)
-        (along,) = [one for one in found if one.code == "P243" and one.is_open]
+        (along,) = [answer for answer in found if answer.code == "P243" and answer.is_open]
         assert np.size(along.evidence["offset_m"].value) == 2 or (
             along.evidence["offset_m"].value == pytest.approx(offset_m * direction(recording), abs=0.025)
         )
@@ -135,7 +135,7 @@ def test_how_far_loads_may_lie_along_feet(recording_of):
 
     def excess_m(offset_m):
         found = place_findings(moved(recording, (offset_m, 0.0, 0.0)), feet, height_m=1.803)
-        return [one.evidence["offset_m"].value for one in found if one.code == "P243"]
+        return [answer.evidence["offset_m"].value for answer in found if answer.code == "P243"]
 
     (ahead,), (behind,) = excess_m(0.06), excess_m(-0.06)
     assert not excess_m(0.06 - ahead + 0.0415)
