@@ -11,7 +11,7 @@ import kinertia
 from command_line import run
 from kinertia.errors import KinertiaError
 from kinertia.estimation.changes import session_changes as module
-from kinertia.estimation.changes.session_changes import session, why_incomparable
+from kinertia.estimation.changes.session_changes import session, unjudged_changes, why_incomparable, why_unjudged
 from kinertia.estimation.changes.stride_features import _CONTACTS, CONTACT_SD_S, _Strides
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.report.comparison.what_changed import compare
@@ -154,6 +154,32 @@ def test_both_are_evaluated_with_one_body(sessions):
     assert np.abs(differences).max() < 1e-9
 
 
+def test_results_of_different_models_are_shown_but_not_judged(sessions):
+    before, after = sessions
+    assert not why_unjudged(before, after)
+    fewer = replace(after.posterior.draws, segments=after.posterior.draws.segments[:-1])
+    found = compare(before, replace(after, posterior=replace(after.posterior, draws=fewer)))
+    usual = compared(before, after, draws=2)
+    comparable = [change for change in usual if change.quantity == "moment" or change.joint in ("hip", "knee", "ankle")]
+    assert {change.names for change in comparable} <= {change.names for change in found.outcomes}
+    assert {change.names for change in found.outcomes} <= {change.names for change in usual}
+    assert {change.verdict for change in found.outcomes} == {"cannot be judged"}
+    assert all("different models" in change.doubt for change in found.outcomes)
+    before_of = {change.names: change.before for change in usual}
+    apart = [change.before - before_of[change.names] for change in found.outcomes if change.quantity == "angle"]
+    assert np.abs(apart).max() < 0.5
+
+    def opposite(name, side):
+        return -1 if name == "knee_angle" else 0
+
+    both = (session(before), session(after))
+    knees = [change for change in unjudged_changes(*both, "another model", opposite) if change.quantity == "angle"]
+    assert {change.joint for change in knees} == {"knee"}
+    assert all(np.sign(change.before) == -np.sign(change.after) for change in knees if change.event == "swing")
+    assert {one["verdict"] for one in found.summary["outcomes"]} == {"cannot be judged"}
+    assert not found.curves
+
+
 def test_what_cannot_be_compared_says_why(sessions, two_level):
     before, after = sessions
     assert not why_incomparable(before, after)
@@ -161,9 +187,6 @@ def test_what_cannot_be_compared_says_why(sessions, two_level):
     assert "two-level" in why_incomparable(before, two_level)
     heavy = replace(after, subject=after.subject.model_copy(update={"mass_kg": 2.0 * after.mass_kg}))
     assert "one person" in why_incomparable(before, heavy)
-    fewer = replace(after.posterior.draws, segments=after.posterior.draws.segments[:-1])
-    other = replace(after, posterior=replace(after.posterior, draws=fewer))
-    assert "different models" in why_incomparable(before, other)
     with pytest.raises(KinertiaError, match="same recording"):
         compare(before, before)
 

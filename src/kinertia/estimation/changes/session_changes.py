@@ -11,14 +11,14 @@ Deviations of a fit whose axes of knees and ankles were fixed are too short for 
 lengthened (`_FIXED_AXES`).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from kinertia.errors import KinertiaError
-from kinertia.estimation.changes.change import Change
+from kinertia.estimation.changes.change import SOURCES, UNITS, Change, named_outcome
 from kinertia.estimation.changes.condition_changes import (
     DRAWS,
     Condition,
@@ -27,7 +27,14 @@ from kinertia.estimation.changes.condition_changes import (
     judged,
     parts_of,
 )
-from kinertia.estimation.changes.stride_features import Rows, StrideFeatures, only, stride_features, usual_sources
+from kinertia.estimation.changes.stride_features import (
+    Rows,
+    StrideFeatures,
+    event_means,
+    only,
+    stride_features,
+    usual_sources,
+)
 from kinertia.estimation.result.drawn_fit import kept_draws
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.trial_fit import TrialFit
@@ -98,12 +105,57 @@ def why_incomparable(before: Fit, after: Fit) -> str:
             return str(error)
     if _recordings(before) & _recordings(after):
         return "both results are from the same recording, so nothing can have changed between them"
-    first, other = (kept_draws(fit) for fit in (before, after))
-    if first.segments != other.segments:
-        return "the results are of different models, which define joints differently"
     if abs(before.mass_kg / after.mass_kg - 1.0) > _LIGHTER:
         return f"masses of {before.mass_kg:.1f} and {after.mass_kg:.1f} kg are hardly of one person"
     return ""
+
+
+def why_unjudged(before: Fit, after: Fit) -> str:
+    """State why changes between two sessions can be shown, but not judged; empty if they can."""
+    if kept_draws(before).segments != kept_draws(after).segments:
+        return "the results are of different models, which define joints differently"
+    return ""
+
+
+def unjudged_changes(
+    before: Session, after: Session, doubt: str, same_sign: Callable[[str, str], int]
+) -> Iterator[Change]:
+    """Yield the outcomes that both sessions have, without deviations: nothing is known of how they depend on models.
+
+    Args:
+        before, after: sessions.
+        doubt: why they are not judged.
+        same_sign: 1 or -1 for the angle (its coordinate without a side, and "r" or "l") that has the same or the
+            opposite sign in both models; 0, and it is left out, where it is another angle.
+    """
+    first, other = (_stride_means(visit) for visit in (before, after))
+    for (outcome, side), values in first.items():
+        if (later := other.get((outcome, side))) is not None:
+            quantity, name, event = outcome.split(" ", 2)
+            sign = 1 if quantity == "moment" else same_sign(name, side)
+            if not sign:
+                continue
+            yield Change(
+                *named_outcome(f"{quantity} {name}"),
+                side,
+                event,
+                UNITS[quantity],
+                float(np.mean(values)),
+                sign * float(np.mean(later)),
+                (len(values), len(later)),
+                np.nan,
+                dict.fromkeys(SOURCES, np.nan),
+                np.nan,
+                doubt=doubt,
+            )
+
+
+def _stride_means(visit: Session) -> dict[tuple[str, str], list[float]]:
+    """Return the means over each event of all strides, by outcome and side."""
+    found: dict[tuple[str, str], list[float]] = {}
+    for (_, outcome, side, _), value in event_means(visit.trials, visit.fit.mass_kg).items():
+        found.setdefault((outcome, side), []).append(value)
+    return found
 
 
 def session_features(

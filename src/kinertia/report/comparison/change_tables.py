@@ -63,6 +63,8 @@ def _judgement(change: Change) -> str:
     """State what became of an outcome, as the predicate of a sentence that a clinician may copy."""
     digits = _DIGITS[change.unit]
     pair = f"from {change.before:.{digits}f} to {change.after:.{digits}f} {change.unit}"
+    if change.doubt and np.isnan(change.sd):
+        return f"went {pair}; whether that is a change cannot be judged, since {change.doubt}"
     if change.doubt:
         return f"went {pair}; a finding about the instruments keeps this from being judged"
     if change.verdict == "cannot be judged":

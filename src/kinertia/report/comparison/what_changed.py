@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +22,9 @@ from kinertia.estimation.changes.session_changes import (
     changes_between,
     session,
     session_features,
+    unjudged_changes,
     why_incomparable,
+    why_unjudged,
 )
 from kinertia.estimation.prepared import Prepared, Progress
 from kinertia.estimation.result.fit import Fit
@@ -44,6 +47,7 @@ from kinertia.report.comparison.change_tables import (
     speed_sentence,
 )
 from kinertia.report.exports.saved_fit import load_fit
+from kinertia.report.figures.coordinate_titles import same_sign
 from kinertia.report.pages.rendering import rendered
 from kinertia.workflow.estimate import estimate
 from kinertia.workflow.from_files import fit_subject, prepare_subject
@@ -199,11 +203,15 @@ def compare(
         reasons = why_incomparable(*fits)
         if reasons:
             raise KinertiaError(reasons)
+        names = conditions or ("before", "after")
+        if doubt := why_unjudged(*fits):
+            sign = partial(_sign_in_both, fits)
+            return _comparison(names, first, other, unjudged_changes(first, other, doubt, sign), (), norms)
         rows, later = session_features(first, other, share_done)
         outcomes = changes_between(rows.events, later.events, first.fixed_axes or other.fixed_axes)
         curves = curve_changes(rows.curves, later.curves, apart)
         note = _NARROW if first.narrow_markers or other.narrow_markers else ""
-        return replace(_comparison(conditions or ("before", "after"), first, other, outcomes, curves, norms), note=note)
+        return replace(_comparison(names, first, other, outcomes, curves, norms), note=note)
     if conditions is None:
         raise KinertiaError("give two sessions, or two conditions of one")
     if isinstance(before, Fit) or Path(before).is_dir():
@@ -216,6 +224,10 @@ def compare(
     masks = masks_of(features.curves, condition, *conditions)
     early, late = (rows_of(features.curves, mask) for mask in masks)
     return _comparison(conditions, first, other, found, curve_changes(early, late, paired), norms)
+
+
+def _sign_in_both(fits: tuple[Fit, Fit], name: str, side: str) -> int:
+    return same_sign(name, side, fits[0].skeleton, fits[1].skeleton) if side else 0
 
 
 def compared_sessions(
@@ -254,7 +266,7 @@ def _comparison(
     doubts = instrument_doubts((first.fit, first.trials), (other.fit, other.trials))
     doubt = " ".join(dict.fromkeys(doubts.values()))
     judged = tuple(
-        replace(outcome, doubt=doubts.get(outcome.side, "") if outcome.quantity == "moment" else "")
+        replace(outcome, doubt=outcome.doubt or (doubts.get(outcome.side, "") if outcome.quantity == "moment" else ""))
         for outcome in outcomes
     )
     walks = first.trials, other.trials
