@@ -3,7 +3,7 @@ import pandas as pd
 import pytest
 
 from kinertia.findings.finding import Severity
-from kinertia.io.ground_forces import read_forces
+from kinertia.io.ground_forces import read_forces, torque_columns
 from kinertia.io.text.sto import write_sto
 from recordings import here, is_here
 from refusals import only, refused
@@ -402,3 +402,16 @@ def test_times_that_do_not_go_on(tmp_path):
         plates_of(forces_at(tmp_path / "grf.mot", np.zeros(100)))
     with refused("T101", None):  # whole seconds are too coarse to tell the rate
         plates_of(forces_at(tmp_path / "grf.mot", (np.arange(3000) / 1000).round()))
+
+
+def test_torque_columns_are_described_by_their_horizontal_lever_arm():
+    """The vertical torque counts in its RMS only; a plate whose point of application stands still has no lever arm."""
+    force, point, torque = np.zeros((3, 200, 2, 3))
+    force[..., 1] = 500.0
+    point[:, 0] = np.linspace([0.0, 0.02, 0.0], [0.4, 0.02, 0.1], 200)
+    torque[:] = 30.0, 100.0, 40.0
+    moving, still = torque_columns(force, point, torque)
+    assert moving.lever_arm_m == pytest.approx(0.1)
+    assert moving.rms_nm == pytest.approx((30.0, 100.0, 40.0))
+    assert (moving.belongs_to, moving.height_m) == (None, pytest.approx(0.02))
+    assert np.isnan(still.lever_arm_m)
