@@ -78,7 +78,7 @@ def calibrated(disturbance: Disturbance, seed: int, duration_s: float = 2.5, com
     prior = literature_prior(person.literature)
 
     def estimate(calibration: CalibrationPrior) -> SimultaneousResult:
-        return estimate_simultaneous(off.skeleton, prior, calibration, [seen])
+        return estimate_simultaneous(off.skeleton, prior, calibration, [seen], with_draws=False)
 
     marker_sd = np.full(len(off.skeleton.markers), 0.005)
     centres = dict.fromkeys(HIP_OFFSETS, LARGEST.hips_m)

@@ -296,7 +296,7 @@ def _outcome(
     calibration = calibration_prior(
         skeleton, replace(GAIT27_UNCERTAINTY, instruments=InstrumentPrior.stated(instruments))
     )
-    result: SimultaneousResult = estimate_simultaneous(skeleton, prior, calibration, seen.pooled)
+    result: SimultaneousResult = estimate_simultaneous(skeleton, prior, calibration, seen.pooled, with_draws=False)
     information = None
     if np.array_equal(prior.mean.table(), adults.mean.table()):
         information = person_information("", adults, prior, result.bsp, result.bsp_covariance)

@@ -68,7 +68,7 @@ def study_draw(number: int, two_level: bool = True) -> dict[str, tuple[float, fl
         estimates["two-level"] = estimate_two_level(trial.skeleton, start, [_window(trial, noisy)]).bsp
 
     def simultaneous(observation: Observation, prior: BspPrior = prior) -> BodySegmentParameters:
-        return estimate_simultaneous(trial.skeleton, prior, calibration, [observation]).bsp
+        return estimate_simultaneous(trial.skeleton, prior, calibration, [observation], with_draws=False).bsp
 
     seen = observation_of(trial, noisy)
     estimates["simultaneous"] = simultaneous(seen)

@@ -119,7 +119,7 @@ def estimate_person(seed: int, case: tuple[Scenario, int]) -> EstimatedPerson:
     skeleton, recorded = measured(trials, scenario.faults, of_noise)
     seen = observe(skeleton, recorded, prior.mass_kg, Bandwidth.of(recorded))
     calibration = calibration_prior(skeleton) if scenario.calibrated else held(skeleton)
-    result = estimate_simultaneous(skeleton, prior, calibration, seen.pooled)
+    result = estimate_simultaneous(skeleton, prior, calibration, seen.pooled, with_draws=False)
     return EstimatedPerson(person, prior, trials, skeleton, recorded, calibration, seen, result, of_noise)
 
 

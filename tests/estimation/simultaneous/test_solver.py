@@ -96,9 +96,17 @@ def test_exact_data_pull_the_body_towards_the_truth(person, prior, exact):
     assert exact.bsp.total_mass_kg == pytest.approx(person.bsp.total_mass_kg, rel=0.005)
 
 
-def test_same_input_same_result(trial, prior, calibration, exact):
-    again = estimate_simultaneous(trial.skeleton, prior, calibration, [observation(trial)])
+@pytest.mark.parametrize("with_draws", [True, False])
+def test_same_input_same_result(trial, prior, calibration, exact, with_draws):
+    again = estimate_simultaneous(
+        trial.skeleton, prior, calibration, [observation(trial)], with_draws=with_draws
+    ).of_first(1)
+    assert (again.draws is not None) == with_draws
+    if with_draws:
+        np.testing.assert_array_equal(again.draws.trials[0].coefficients, exact.draws.trials[0].coefficients)
     np.testing.assert_array_equal(again.bsp.table(), exact.bsp.table())
+    np.testing.assert_array_equal(again.bsp_covariance, exact.bsp_covariance)
+    np.testing.assert_array_equal(again.curve_deviations[0].moments, exact.curve_deviations[0].moments)
     np.testing.assert_array_equal(again.motions[0].q, exact.motions[0].q)
     assert again.cost == exact.cost
 

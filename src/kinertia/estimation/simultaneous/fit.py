@@ -224,6 +224,7 @@ def _posterior(
     uncertainty: ModelUncertainty,
 ) -> Posterior:
     """Return the uncertainty of a result from the first observations, those of these trials."""
+    assert result.draws is not None
     observations = seen.pooled[: len(trials)]
     covariance, before = (uncertainty.whole_covariance(c) for c in (result.bsp_covariance, prior.covariance))
     complete = [m if k.complete else m.cut(slice(0, 0)) for m, k in zip(motions, trials, strict=True)]

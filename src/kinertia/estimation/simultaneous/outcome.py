@@ -41,7 +41,7 @@ class SimultaneousResult:
         cost: half the sum of squares, at the start and at the end.
         support: whether each instrument error is credible.
         evidence: of the trials, and of the same trials interpreted differently.
-        draws: from the posterior.
+        draws: from the posterior, or None.
         missing_loads: loads of which a part is missing, which seem to be errors of plates.
     """
 
@@ -61,14 +61,14 @@ class SimultaneousResult:
     cost: tuple[float, float]
     support: InstrumentSupport
     evidence: Evidence
-    draws: PosteriorDraws
+    draws: PosteriorDraws | None
     missing_loads: tuple[MissingLoad, ...] = ()
 
     def of_first(self, count: int) -> Self:
         """Return the result with the first `count` trials only."""
         names = ("foot_loads", "reactions", "motions", "marker_offsets_m", "curve_deviations")
         first = {name: getattr(self, name)[:count] for name in names}
-        return replace(self, **first, draws=self.draws.of_first(count))
+        return replace(self, **first, draws=None if self.draws is None else self.draws.of_first(count))
 
 
 class Ended(NamedTuple):
@@ -94,7 +94,7 @@ def result_of(
     of_curves: tuple[CurveDeviations, ...],
     support: InstrumentSupport,
     evidence: Evidence,
-    draws: PosteriorDraws,
+    draws: PosteriorDraws | None,
 ) -> SimultaneousResult:
     """Convert the end of the search to a result in physical units, from the terms' readings of the solution.
 

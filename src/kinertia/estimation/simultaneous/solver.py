@@ -111,11 +111,13 @@ def estimate_simultaneous(
     progress: Callable[[float], None] = lambda share: None,
     otherwise: Sequence[Observation] = (),
     terms: Sequence[type[CostTerm]] = TERMS,
+    with_draws: bool = True,
 ) -> SimultaneousResult:
     """Estimate motion, BSPs and calibration of one person from one or more trials (maximum a posteriori).
 
     `progress` is called with the share done, guessed from the usual number of steps. `otherwise` are the same trials
-    with other ground reactions, whose evidence is computed for comparison. `terms` are those of the cost.
+    with other ground reactions, whose evidence is computed for comparison. `terms` are those of the cost. Without draws
+    from the posterior, all else is the same.
     """
     problem = MapProblem(skeleton, prior, calibration, trials, terms=terms)
     ended, model = _optimum(problem, progress)
@@ -144,7 +146,7 @@ def estimate_simultaneous(
     modes = [of_knots(phases), *of_root(model, point, more)]
     motions, (covariance, curves, draws) = both(
         lambda: _through_impacts(problem, point),
-        lambda: _uncertainty(problem, ended, model, (roots, more), modes, phases),
+        lambda: _uncertainty(problem, ended, model, (roots, more), modes if with_draws else None, phases),
     )
     covariance += phases.covariance + more @ more.T
     support = instrument_support(model, ended.point, ended.instruments, curves)
@@ -363,12 +365,13 @@ def _uncertainty(
     ended: Ended,
     model: GaussNewton,
     uncertain: tuple[Sequence[np.ndarray], np.ndarray],
-    modes: Sequence[Mode],
+    modes: Sequence[Mode] | None,
     phases: OfPhases,
-) -> tuple[np.ndarray, tuple[CurveDeviations, ...], PosteriorDraws]:
+) -> tuple[np.ndarray, tuple[CurveDeviations, ...], PosteriorDraws | None]:
     """Return covariance (S, S) of the static unknowns with these knots, SDs of the curves of every trial, and draws.
 
-    `uncertain` are the roots of `_roots_in_trials` and that of `_left_out`, `modes` its effects and those of the knots.
+    `uncertain` are the roots of `_roots_in_trials` and that of `_left_out`, `modes` its effects and those of the knots;
+    None for no draws.
     """
     root, point, of_curves, noises = model.static.root_of_covariance(), ended.point, [], []
     roots, more = uncertain
@@ -379,7 +382,8 @@ def _uncertainty(
         noises.append(motion_noise(problem, k, *here) / problem.trials[k].repeats)
         deviations = curve_deviations(problem, k, *here, trial, in_trial, noises[-1])
         of_curves.append(deviations.and_of(phases.curves_apart(k)))
-    return root @ root.T, tuple(of_curves), posterior_draws(model, point, roots, noises, modes)
+    draws = None if modes is None else posterior_draws(model, point, roots, noises, modes)
+    return root @ root.T, tuple(of_curves), draws
 
 
 def _roots_in_trials(problem: MapProblem, ended: Ended, model: GaussNewton) -> list[np.ndarray]:
