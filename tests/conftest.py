@@ -289,7 +289,8 @@ def measured_demo(tmp_path_factory, sample_walk) -> MeasuredDemo:
         assert outcome.status in (0, 1), outcome.err
         return MeasuredDemo(folder, outcome, fits[0])
 
-    return once(tmp_path_factory, "measured", make)
+    kind = "synthetic" if find(samples.NAME) is None else "measured"
+    return once(tmp_path_factory, f"measured-demo-{kind}", make)
 
 
 @pytest.fixture
@@ -300,15 +301,19 @@ def few_evaluations(monkeypatch):
 
 
 @pytest.fixture(scope="session")
-def short_fit(recording_of):
+def short_fit(tmp_path_factory, recording_of):
     """A two-level `Fit` from the Python functions: two short windows of one walk, each as a trial of its own."""
-    walk, static = (recording_of(f"synthetic/{kind}.c3d") for kind in ("walk", "static"))
-    inputs = [
-        TrialInput(replace(walk, name=name), window, 0.25)
-        for name, window in (("early", (1.2, 1.5)), ("late", (1.7, 2.0)))
-    ]
-    with mock.patch(LIMITS[0], FEW_EVALUATIONS), mock.patch(LIMITS[1], FEW_EVALUATIONS):
-        return estimate_bsp(Subject(name="A", sex="male"), static, inputs, Settings(method="two-level"))
+
+    def make(_: Path) -> Fit:
+        walk, static = (recording_of(f"synthetic/{kind}.c3d") for kind in ("walk", "static"))
+        inputs = [
+            TrialInput(replace(walk, name=name), window, 0.25)
+            for name, window in (("early", (1.2, 1.5)), ("late", (1.7, 2.0)))
+        ]
+        with mock.patch(LIMITS[0], FEW_EVALUATIONS), mock.patch(LIMITS[1], FEW_EVALUATIONS):
+            return estimate_bsp(Subject(name="A", sex="male"), static, inputs, Settings(method="two-level"))
+
+    return once(tmp_path_factory, "short-fit", make)
 
 
 @pytest.fixture(scope="session")

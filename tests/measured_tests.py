@@ -15,7 +15,7 @@ import pytest
 
 from kinertia.io.samples import VARIABLE
 from recordings import NEEDS_MEASURED, REQUIRED
-from validation.measured_data import find
+from validation.measured_data import find, places
 
 MARK = "measured"
 OF_ANY_WALK = "sample_walk"
@@ -38,12 +38,12 @@ class MeasuredTests:
         self.everywhere: frozenset[str] | None = None
 
     def pytest_sessionstart(self, session):
-        """Collect once as if no recordings were there, if tests are chosen by the mark."""
+        """Collect once as if no recordings were there, if some are and tests are chosen by the mark."""
         config = session.config
         if hasattr(config, "workerinput"):
             everywhere = config.workerinput[_EVERYWHERE]
             self.everywhere = None if everywhere is None else frozenset(everywhere)
-        elif MARK in config.option.markexpr:
+        elif MARK in config.option.markexpr and places():
             self.everywhere = collected_without(config.rootpath)
 
     @pytest.hookimpl(optionalhook=True)

@@ -1,4 +1,7 @@
-"""What several workers of one run of the tests need is made by the first, and read by the others."""
+"""What several workers of one run of the tests need is made by the first, and read by the others.
+
+Several runs of one state of the code, as in `.ci/run`, share it where the environment variable names a folder.
+"""
 
 import os
 import pickle
@@ -8,12 +11,14 @@ from pathlib import Path
 from typing import TypeVar
 
 T = TypeVar("T")
+SHARED = "KINERTIA_TESTS_SHARE"
 
 
 def once(tmp_path_factory, name: str, make: Callable[[Path], T]) -> T:
     """What `make` returns for an empty folder, called by one worker only; the others wait. It must be picklable."""
     base = tmp_path_factory.getbasetemp()
-    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / f"once-{name}"
+    of_run = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+    folder = Path(os.environ.get(SHARED, of_run)) / f"once-{name}"
     done, failed = folder / "done.pickle", folder / "failed"
     try:
         folder.mkdir()

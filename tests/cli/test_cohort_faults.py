@@ -36,6 +36,7 @@ def may_mount():
 
 @posix
 @pytest.mark.slow
+@pytest.mark.first
 def test_killed_at_20_random_moments_and_on_full_disks_all_are_finished_byte_for_byte(tmp_path):
     apart = ["unshare", "-rm"] if may_mount() else []
     command = [*apart, sys.executable, TESTS / "cohort_kills.py", tmp_path, "20", "21"]

@@ -116,6 +116,7 @@ def test_residuals_markers_and_parameters(fit_with_model, name):
 
 
 @pytest.mark.slow
+@pytest.mark.first
 def test_walks_and_squats_pooled(measured_folder, tmp_path):
     """Of the squats, the first two."""
     subject = tmp_path / "subject4.toml"

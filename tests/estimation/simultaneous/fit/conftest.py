@@ -3,6 +3,7 @@
 import pytest
 
 from kinertia.synthetic.walk import walk, walking_subject
+from once import once
 from short_walk_fit import fitted
 
 
@@ -12,5 +13,5 @@ def trial():
 
 
 @pytest.fixture(scope="session")
-def plain(trial):
-    return fitted(trial)
+def plain(tmp_path_factory, trial):
+    return once(tmp_path_factory, "short-walk-fit", lambda _: fitted(trial))
