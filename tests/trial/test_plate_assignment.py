@@ -434,8 +434,10 @@ def test_a_stated_foot_goes_before_the_nearest_one():
 
 def test_a_load_that_is_stated_to_be_of_no_foot_is_not_used():
     recording = walk([("r", 0), ("l", 0)])
+    plain, _ = assign_plates(recording, FEET)
     loads, _ = assign_plates(
         replace(recording, stated_contacts=(StatedContact(recording.plates.names[1], None),)), FEET
     )
     assert loads.force[:, 0].any()
+    np.testing.assert_array_equal(loads.force[:, 0], plain.force[:, 0])
     assert not loads.force[:, 1].any()

@@ -47,3 +47,11 @@ def test_only_codes_can_be_overruled(folder, old, new, line, key, expected):
 def test_what_is_overruled_in_a_trial_is_found_in_its_line(folder):
     with refused("F191", 21, key="waive"):
         read(folder, GOOD.replace("[settings]", '[trial.diagnostics]\nwaive = ["X1"]\n\n[settings]'))
+
+
+def test_the_last_reason_of_a_code_its_question_or_family_is_given():
+    of_study, of_person = Overrule(("P244",), reasons=(("P", "new floor"),)), Overrule(reasons=(("P24", "worn shoe"),))
+    assert (of_study + of_person).reason("P244") == "worn shoe"
+    assert (of_person + of_study).reason("P244") == "new floor"
+    assert (of_study + of_person).reason("P213") == "new floor"
+    assert (of_study + of_person).reason("M102") == ""
