@@ -87,10 +87,11 @@ class Person:
     truth: tuple[Mapping[str, float], ...]
 
     def judged(self, other_day: int) -> list[Judged]:
-        """Judge the changes from the first to the second or third day (1, 2)."""
+        """Judge the changes from the first to the second or third day (1, 2); none where a day has one stride only."""
         found = changes_between(*(self.unchanged, self.changed)[other_day - 1], fixed_axes=False)
         before, after = self.truth[0], self.truth[other_day]
-        return [Judged(change, after[name] - before[name]) for change in found if (name := outcome(change)) in before]
+        known = [change for change in found if change.verdict != "cannot be judged"]
+        return [Judged(change, after[name] - before[name]) for change in known if (name := outcome(change)) in before]
 
 
 @dataclass(frozen=True, eq=False)

@@ -110,7 +110,7 @@ def unaffected_table(found: Mapping[str, Sequence[Change]]) -> str:
 
 def coverage_table(people: Sequence[Person]) -> str:
     """Return coverage and false alarms of the synthetic people, by joint group."""
-    days = [[walker.judged(day) for walker in people] for day in (1, 2)]
+    days = [[known for walker in people if (known := walker.judged(day))] for day in (1, 2)]
     rows = []
     for name in groups():
         row = [name]
@@ -197,6 +197,7 @@ def document(walks: Mapping[str, Rows], people: Sequence[Person]) -> str:
         coverage=coverage_table(people) if people else "",
         primary=primary_table(people) if people else "",
         published=published_table(people) if people else "",
+        alone=sum(not walker.judged(day) for walker in people for day in (1, 2)),
     )
 
 
@@ -243,6 +244,8 @@ N m/kg or degrees. *Changed*: called so without a change, of all outcomes, witho
 {coverage}
 
 {primary}
+
+A day with a single stride on plates shows no spread: *cannot be judged*, and not counted ({alone} comparisons of days).
 
 The true value is that of the posture without differences between walks, at the true contacts of that posture. Contacts
 that no plate measured come from the motion; the deviations allow for 10 ms, by foot and kind of contact. Contacts that
