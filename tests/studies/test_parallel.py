@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from kinertia.studies.parallel import in_parallel, process_count
+from one_process import in_one_process
 
 
 def test_results_are_in_the_order_of_the_cases_and_no_process_is_left():
@@ -15,6 +16,18 @@ def test_results_are_in_the_order_of_the_cases_and_no_process_is_left():
     assert in_parallel(abs, [-3, 1, -2], workers=2, progress=shares.append) == [3, 1, 2]
     assert shares == pytest.approx([0, 1 / 3, 2 / 3, 1])
     assert not multiprocessing.active_children()
+
+
+def test_tests_can_have_studies_in_their_own_process():
+    shares = []
+    with in_one_process():
+        assert in_parallel(lambda case: (case, os.getpid()), "ab", progress=shares.append) == [
+            ("a", os.getpid()),
+            ("b", os.getpid()),
+        ]
+        with pytest.raises(ZeroDivisionError):
+            in_parallel(lambda case: 1 / case, [1, 0])
+    assert shares == [0.0, 0.5, 1.0]
 
 
 @pytest.mark.parametrize(
