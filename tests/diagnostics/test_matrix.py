@@ -83,7 +83,7 @@ def test_a_run_with_few_frames_a_second_is_no_fault_of_the_rates(recording_of, n
     assert not [reported.code for reported in found if reported.is_open and reported.severity is Severity.ERROR]
 
 
-@pytest.mark.parametrize("code", [code for code, rule_ in RULES.items() if rule_.supersedes])
+@pytest.mark.parametrize("code", [code for code, entry in RULES.items() if entry.supersedes])
 def test_a_cause_mutes_what_it_explains_where_it_was_found(code):
     """And takes over its severity; elsewhere it says nothing of it."""
     for other in sorted({consequence for entry in RULES[code].supersedes for consequence in matching(entry)}):

@@ -29,7 +29,10 @@ def shown(skeleton, prior, recorded) -> InstrumentInformation:
 def together(said) -> tuple[np.ndarray, np.ndarray]:
     """Values and deviations of all plates' errors, each with what all plates have in common, and of the delay."""
     (plates,) = {information_of_trial.plates for information_of_trial in said}
-    information, rhs = sum(shown_.information for shown_ in said), sum(shown_.rhs for shown_ in said)
+    information, rhs = (
+        sum(information_of_trial.information for information_of_trial in said),
+        sum(information_of_trial.rhs for information_of_trial in said),
+    )
     prior = GaussianPrior.given(InstrumentPrior().of_unknowns(plates), information, rhs)
     covariance = np.linalg.inv(information + prior.precision)
     to_plates = np.zeros((len(PLATE_UNKNOWNS) * len(plates) + 1, len(rhs)))

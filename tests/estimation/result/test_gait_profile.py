@@ -155,8 +155,8 @@ def test_scores_of_each_stride_stand_in_the_table_of_cycles(fit, sides):
 def test_norms_of_other_people_are_said_to_be(fit):
     def said(age, **norm):
         person = replace(fit, subject=fit.subject.model_copy(update={"age_years": age}))
-        norm_ = Norm(np.zeros(1), np.zeros(1), np.zeros(1), 4, "Kinertia gait27", **norm)
-        return " ".join(remarks(person, norm_))
+        angle_norm = Norm(np.zeros(1), np.zeros(1), np.zeros(1), 4, "Kinertia gait27", **norm)
+        return " ".join(remarks(person, angle_norm))
 
     assert said(35.0, age_years=(20.0, 40.0), speed_m_s=(0.1, 9.0)) == ""
     assert "35 years old, people in the norms 7 to 11" in said(35.0, age_years=(7.0, 11.0))

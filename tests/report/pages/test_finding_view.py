@@ -61,7 +61,7 @@ def test_equal_findings_are_one_card_with_the_evidence_of_each():
 def test_findings_of_several_models_are_told_apart_by_their_files_and_each_explains_its_own():
     models = [
         Overview(
-            [finding_.in_file(file) for finding_ in (cause, finding("O302", Where(part="knee")).muted("O301"))], 61, 1
+            [reported.in_file(file) for reported in (cause, finding("O302", Where(part="knee")).muted("O301"))], 61, 1
         )
         for file, cause in (("a.osim", finding("O301")), ("b.osim", finding("O301")))
     ]

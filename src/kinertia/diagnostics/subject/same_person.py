@@ -224,9 +224,7 @@ def _moved_markers(
     before, after = distances.lengths()
     far = (np.abs(off) > least_m) & (np.abs(off) > least_share * np.minimum(before, after))
     moved: list[_Moved] = []
-    kept = ~np.isin(distances.pairs, [k for k, label_ in enumerate(distances.labels) if label_ in exchanged]).any(
-        axis=1
-    )
+    kept = ~np.isin(distances.pairs, [k for k, label in enumerate(distances.labels) if label in exchanged]).any(axis=1)
     while (far & kept).any() and len(moved) < _MOST_MOVED:
         # one marker that moved takes all of its distances along
         about = [np.abs(off[kept & _with(distances, k)]) for k in range(len(distances.labels))]

@@ -96,7 +96,7 @@ def test_normal_equations_are_the_sum_over_time_blocks(whole, cut, here):
 
 
 def test_elimination_and_steps_are_those_of_the_whole(whole, cut, here, double):
-    expected, actual = (problem_.eliminated(0, *here, DAMPING) for problem_ in (whole, cut))
+    expected, actual = (posed.eliminated(0, *here, DAMPING) for posed in (whole, cut))
     close(actual.gradient.rhs, whole.normal(0, *here).rhs)
     close(actual.information, expected.information)
     close(actual.static_diagonal, np.diag(whole.normal(0, *here).static))
@@ -138,12 +138,11 @@ def test_single_precision_loses_nothing_that_counts(cut, here, monkeypatch):
 
 
 def test_deviations_of_curves_are_those_of_the_whole(whole, cut, here, double):
-    expected, actual = (problem_.eliminated(0, *here) for problem_ in (whole, cut))
+    expected, actual = (posed.eliminated(0, *here) for posed in (whole, cut))
     information = expected.information + np.diag(1.0 / np.maximum(np.abs(here[1]), 0.1) ** 2)
     root = StaticInformation.of(information, whole.layout.in_root.stop).root_of_covariance()
     sd = [
-        curve_deviations(problem_, 0, *here, part, root, np.ones(3))
-        for problem_, part in ((whole, expected), (cut, actual))
+        curve_deviations(posed, 0, *here, part, root, np.ones(3)) for posed, part in ((whole, expected), (cut, actual))
     ]
     for field in fields(CurveDeviations):
         close(getattr(sd[1], field.name), getattr(sd[0], field.name))

@@ -58,7 +58,7 @@ def test_derivatives_are_those_of_the_cost():
         there, back = coefficients.copy(), coefficients.copy()
         there[i, j] += step
         back[i, j] -= step
-        two = [normal_at(basis_, TimeBlock.whole(basis)) for basis_ in (there, back)]
+        two = [normal_at(moved, TimeBlock.whole(basis)) for moved in (there, back)]
         slope = (two[0].cost - two[1].cost) / (2 * step)
         assert slope == pytest.approx(-whole.rhs[i, j], rel=1e-5, abs=1e-3)
         bends = -(two[0].rhs - two[1].rhs)[i : i + 6] / (2 * step)

@@ -97,7 +97,7 @@ def curves_apart(problems: Sequence[MapProblem], points: Sequence[Point], k: int
     frames, basis = problems[0].trials[k].curve_frames, problems[0].bases[k]
     statics = [problem.in_trial(k, point) for problem, point in zip(problems, points, strict=True)]
     reactions = [problem.loads.reactions(k, static) for problem, static in zip(problems, statics, strict=True)]
-    estimates = [(point_.coefficients[k], static) for point_, static in zip(points, statics, strict=True)]
+    estimates = [(phase_point.coefficients[k], static) for phase_point, static in zip(points, statics, strict=True)]
     joints = len(body_joints(problems[0].skeleton))
     variances = CurveDeviations.filled(len(frames), len(problems[0].moving), joints, 0.0)
     for some in pieces(len(frames)):
