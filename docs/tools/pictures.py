@@ -16,12 +16,12 @@ from examples import ROOT, blocks, link_measured
 
 FOLDER = ROOT / "docs" / "figures"
 PAGES = {
-    "report": ("report.html", "#verdict", [".headline", ".uses"], 1160),
-    "report-cycle": ("report.html", "figure:has(#cycle-joint-moments)", ["#cycle-joint-moments", ".save"], 860),
-    "report-view": ("report.html", "#view", ["canvas", "#view .controls", "#view .legend"], 920),
-    "check": ("check.html", "#recording2", ["#recording2-forces", "#recording2-pressure"], 1060),
+    "report": ("report.html", "#verdict", [".headline", ".uses"], 1480, 900),
+    "report-cycle": ("report.html", "#moments figure", ["#cycle-joint-moments", ".save button"], 1480, 600),
+    "report-view": ("report.html", "#view", ["canvas", "#view .controls", "#view .legend"], 1180, 920),
+    "check": ("check.html", "#recording2", ["#recording2-forces", "#recording2-pressure"], 1180, 1060),
 }
-"""Picture: page, the part of it, what is numbered there, and the height from its top in px."""
+"""Picture: page, the part of it, what is numbered there, width, and height from its top in px."""
 GALLERY = ("moments", "angles", "bsp")
 
 _NUMBERED = """([part, marked]) => {
@@ -54,8 +54,8 @@ def main() -> None:
             subprocess.run(["kinertia", command, subject, "-o", Path(made) / command, "--quiet"], check=True)
         with sync_playwright() as engine:
             browser = engine.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"])
-            for name, (page, part, marked, height) in PAGES.items():
-                opened = browser.new_page(viewport={"width": 1180, "height": height})
+            for name, (page, part, marked, width, height) in PAGES.items():
+                opened = browser.new_page(viewport={"width": width, "height": height})
                 opened.goto((Path(made) / ("fit" if page == "report.html" else "check") / page).as_uri())
                 take(opened, part, marked, FOLDER / f"{name}.png")
             browser.close()

@@ -271,7 +271,7 @@ def _compact(panels: Sequence[Panel], x: dict[str, Any], row_px: int, legend: in
             lowest = k + min(columns, count) >= count
             way[f"xaxis{suffix}.showticklabels"] = lowest
             way[f"xaxis{suffix}.title.text"] = x["title"]["text"] if lowest else ""
-            title = panel.title if columns > 2 else _ROTATION.sub(r"\1. rotation", panel.title)
+            title = panel.title if width_px == _NOMINAL_WIDTH_PX else _ROTATION.sub(r"\1. rotation", panel.title)
             way[f"annotations[{k}].text"] = f"<b>{plain(title)}</b>" if paper else _on_two_lines(title)
         ways[name] = way
     return ways
