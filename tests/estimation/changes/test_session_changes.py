@@ -176,7 +176,7 @@ def test_results_of_different_models_are_shown_but_not_judged(sessions):
     knees = [change for change in unjudged_changes(*both, "another model", opposite) if change.quantity == "angle"]
     assert {change.joint for change in knees} == {"knee"}
     assert all(np.sign(change.before) == -np.sign(change.after) for change in knees if change.event == "swing")
-    assert {one["verdict"] for one in found.summary["outcomes"]} == {"cannot be judged"}
+    assert {outcome["verdict"] for outcome in found.summary["outcomes"]} == {"cannot be judged"}
     assert not found.curves
 
 

@@ -160,29 +160,15 @@ def write_variances(
     _, n, c = out.shape
     size = moment.shape[1]
     alone = np.empty((6, 6))
-    zero, splines = moment.dtype.type(0.0), values.astype(moment.dtype)
+    zero, phi = moment.dtype.type(0.0), values.astype(moment.dtype)
     for j in range(c):
         u, v, w, x, y, z = carried[0, j], carried[1, j], carried[2, j], carried[3, j], carried[4, j], carried[5, j]
         for i in range(6):
             for s in range(6):
                 alone[i, s] = covariance[i * c + j, s * c + j]
         for k in range(n):
-            p0, p1, p2, p3, p4, p5 = (
-                splines[0, k, 0],
-                splines[0, k, 1],
-                splines[0, k, 2],
-                splines[0, k, 3],
-                splines[0, k, 4],
-                splines[0, k, 5],
-            )
-            r0, r1, r2, r3, r4, r5 = (
-                splines[1, k, 0],
-                splines[1, k, 1],
-                splines[1, k, 2],
-                splines[1, k, 3],
-                splines[1, k, 4],
-                splines[1, k, 5],
-            )
+            p0, p1, p2, p3, p4, p5 = phi[0, k, 0], phi[0, k, 1], phi[0, k, 2], phi[0, k, 3], phi[0, k, 4], phi[0, k, 5]
+            r0, r1, r2, r3, r4, r5 = phi[1, k, 0], phi[1, k, 1], phi[1, k, 2], phi[1, k, 3], phi[1, k, 4], phi[1, k, 5]
             place, rate, force, both, row = zero, zero, zero, zero, k * c + j
             for s in range(size):
                 shift = p0 * u[s] + p1 * v[s] + p2 * w[s] + p3 * x[s] + p4 * y[s] + p5 * z[s]
