@@ -14,7 +14,7 @@ import numpy as np
 
 from kinertia.estimation.result.curve_source import CurveSource, Estimated
 from kinertia.estimation.result.cycles import spread_evenly
-from kinertia.estimation.result.drawn_curves import DrawnCurves
+from kinertia.estimation.result.drawn_curves import AT_ONCE, DrawnCurves
 from kinertia.estimation.result.drawn_fit import drawn_bodies, drawn_joints, kept_draws
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.trial_fit import TrialFit
@@ -39,8 +39,6 @@ _OPPOSITE = {"opposite_toe_off_s": "toe off", "opposite_strike_s": "heel strike"
 _SAME_TIME_S = 0.003
 _FEWER = 2
 """Factor by which draws of parts are fewer than of everything: they mostly divide a variance."""
-_AT_ONCE = 10
-"""Draws whose curves are computed together."""
 Key = tuple[str, str, str, str]
 """Trial, outcome, side, phase and number of the stride; of a curve, the outcome has no event."""
 
@@ -111,7 +109,7 @@ def stride_features(
     done = 0
     for source, draws in sources.items():
         features, rows = [], []
-        for some in pieces(counts[source], _AT_ONCE):
+        for some in pieces(counts[source], AT_ONCE):
             numbers = list(range(counts[source]))[some]
             for drawn in strides.curves(_drawn(fit, trials, draws, numbers, source == "all"), fit.mass_kg):
                 features.append(_means(drawn[shown], weights))

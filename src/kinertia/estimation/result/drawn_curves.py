@@ -1,9 +1,9 @@
-"""Makes angles and joint moments of a trial in several posterior draws at once, without all else of `drawn_fit`.
+"""Makes curves of a trial in several posterior draws at once, without all else of `drawn_fit`.
 
 What is equal in all these draws, as motion and forces are where only the body differs, is computed once.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Self, TypeAlias
@@ -11,15 +11,27 @@ from typing import Self, TypeAlias
 import numpy as np
 
 from kinertia.estimation.result.curve_source import Gapped, through_angles, through_loads
-from kinertia.estimation.result.drawn_fit import drawn_knees, drawn_motions, drawn_reactions
+from kinertia.estimation.result.drawn_fit import (
+    drawn_bodies,
+    drawn_joints,
+    drawn_knees,
+    drawn_motions,
+    drawn_reactions,
+    kept_draws,
+)
+from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.trial_fit import JointCurves, TrialFit, known_joints
 from kinertia.estimation.simultaneous.uncertainty.model_errors import with_drawn_knees
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import TrialDraws
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
+from kinertia.motion.dynamics import Motion, inverse_dynamics
 from kinertia.motion.joint_moments import body_joints, joint_loads
+from kinertia.motion.workload import pieces
 
 Model: TypeAlias = tuple[Skeleton, BodySegmentParameters]
+AT_ONCE = 10
+"""Draws whose curves are computed together: more take memory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +76,22 @@ class DrawnCurves:
             Gapped.of(time, np.where(_shown(curves)[..., None], angles, np.nan), through),
             Gapped.of(time, moments, through_loads),
         )
+
+
+def drawn_forces(
+    fit: Fit, trial: TrialFit, draws: TrialDraws, numbers: Sequence[int]
+) -> Iterator[tuple[Motion, np.ndarray]]:
+    """Yield motion and generalised forces (f, c) of the draws with these numbers, as `JointCurves` has them.
+
+    Without joint curves they are those of the measured windows.
+    """
+    kept, known = kept_draws(fit), True if trial.joint_curves is None else trial.joint_curves.known
+    for some in pieces(len(numbers), AT_ONCE):
+        time, motions = drawn_motions(trial, draws, numbers[some])
+        for number, motion in zip(numbers[some], motions, strict=True):
+            skeleton, bsp = drawn_joints(fit.skeleton, kept, number), drawn_bodies(fit.estimate, kept, number)
+            foot_loads = drawn_reactions(trial.reactions, draws, number).at(time)
+            yield motion, np.where(known, inverse_dynamics(skeleton, bsp, motion, foot_loads), np.nan)
 
 
 def _shown(curves: JointCurves) -> np.ndarray:

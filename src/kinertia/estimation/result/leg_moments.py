@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.estimation.result.curve_source import Estimated
-from kinertia.estimation.result.drawn_fit import drawn_fit
+from kinertia.estimation.result.drawn_curves import drawn_forces
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.trial_fit import JointCurves, TrialFit
 from kinertia.motion.ground_reactions import GroundReactions
@@ -224,10 +224,10 @@ def _departures(fit: Fit, trial: TrialFit) -> Departures | None:
     if fit.posterior is None or fit.posterior.draws is None:
         return None
     k, kept = [fitted.name for fitted in fit.trials].index(trial.name), fit.posterior.draws
-    trial_draws = replace(kept, trials=(kept.trials[k],))
-    alone = replace(fit, trials=(trial,), posterior=replace(fit.posterior, draws=trial_draws))
-    here = _curves(trial)
-    drawn = [_curves(drawn_fit(alone, number).trials[0]) for number in range(min(kept.count, _MOST_DRAWS))]
+    here, numbers = _curves(trial), list(range(min(kept.count, _MOST_DRAWS)))
+    drawn = [
+        (motion.q, forces, forces * motion.qd) for motion, forces in drawn_forces(fit, trial, kept.trials[k], numbers)
+    ]
     return Departures(*(np.array(departed) - at for departed, at in zip(zip(*drawn, strict=True), here, strict=True)))
 
 
