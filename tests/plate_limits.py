@@ -151,6 +151,18 @@ def outside(distance_m):
     return loads_and_feet(context)
 
 
+def away_from_feet(distance_m):
+    """Loads of one plate that are this far from the feet, each in another direction."""
+    contacts = [
+        SimpleNamespace(
+            distance_m=distance_m, own_offset_m=np.array(offset_m), between=False, time=np.arange(3.0), plate=0
+        )
+        for offset_m in ((distance_m, 0.0), (0.0, distance_m))
+    ]
+    context = SimpleNamespace(plates=SimpleNamespace(names=("plate",)), contacts=contacts, at=at)
+    return [hypothesis.finding for hypothesis in cop_positions._displaced(context)]
+
+
 def weighing(ratio):
     """Two plates on which one body weighs differently."""
     return gains(
@@ -287,6 +299,7 @@ PLATE_LIMITS = {
     "P252 forwards": (lambda share, patched: progressing(patched, -0.5, share), 0.24, 0.26, [], ["WARNING"]),
     "P261 lever_arm": (columns, 0.0049, 0.0051, [], ["WARNING"]),
     "P264 absent": (untwisted, 0.0051, 0.0049, [], ["WARNING"]),
+    "P244 far": (away_from_feet, 0.149, 0.151, [], ["ERROR"]),
     "P285 far": (standing_by, 0.299, 0.301, [], ["CORRECTED"]),
     "P287 equal": (repeated_plate, 0.031, 0.029, [], ["ERROR"]),
 }

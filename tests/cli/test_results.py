@@ -41,7 +41,7 @@ def test_a_letter_is_written_on_request_and_belongs_to_the_results(results):
     assert [told[name] for name in ("report", "letter")] == [
         str(results / f"{page}.html") for page in ("report", "letter")
     ]
-    assert 'class="summary letter"' in (results / "letter.html").read_text(encoding="utf-8")
+    assert 'class="summary letter gait"' in (results / "letter.html").read_text(encoding="utf-8")
     assert run("report", results).status == 0
     assert not (results / "letter.html").exists(), "it would be of another report"
 

@@ -70,7 +70,6 @@ NOT_TRIED = {
     "P241": "far",
     "P242": "wrong",
     "P243": "back begin end far forward offset",
-    "P244": "far",
     "P266": "lever_arm",
     "P272": "loading middle",
     "P273": "shortest",
