@@ -10,7 +10,9 @@ import pytest
 
 from chromium import DESKTOP, PATIENCE_MS, PHONE, Opened, colour, ink, playwright
 from found import FAULT_FREE, UNUSABLE
+from kinertia.io.norms_file import Norm
 from kinertia.model.bsp import BodySegmentParameters
+from kinertia.motion.model_outputs import CLINICAL_ANGLES
 from kinertia.report.comparison.side_by_side import render_comparison
 from kinertia.report.pages.page import render
 from report_page import without_plotly
@@ -25,6 +27,8 @@ SWITCHED = """plot => {
 
 SMALLEST_LETTERS_PX = 11
 POINTS_PER_PX = 0.75
+PAPER_PX = 703
+"""Width of A4 between its margins of 12 mm."""
 
 pytestmark = pytest.mark.slow
 
@@ -392,6 +396,22 @@ def test_comparison_is_drawn_fits_the_window_and_sorts(browser, comparison, widt
     assert len(cells) == 120
     assert opened.errors == []
     assert [url for url in opened.requests if not url.startswith(("data:", "blob:"))] == [page.url]
+    page.close()
+
+
+def test_a_letter_with_norms_is_as_wide_as_the_paper(browser, fit, tmp_path):
+    """The chart of gait scores was wider, so that the browser printed everything smaller."""
+    norms = {name: Norm(np.array([0.0, 100.0]), np.zeros(2), np.ones(2)) for name in CLINICAL_ANGLES}
+    path = tmp_path / "letter.html"
+    path.write_text(render(fit, norms=norms, template="letter"), encoding="utf-8")
+    page = Opened(browser, path).page
+    page.set_viewport_size({"width": PAPER_PX, "height": 900})
+    page.emulate_media(media="print")
+    page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+    assert page.locator("#map .trace").count() > 0
+    assert page.evaluate("document.documentElement.scrollWidth") <= PAPER_PX
+    page.emulate_media(media="null")
+    assert pages(page, prefer_css_page_size=True) == 2
     page.close()
 
 

@@ -376,7 +376,7 @@ def map_figure(view: ProfileView) -> Figure:
     ]
     layout = base_layout("Movement Analysis Profile: Gait Variable Score of each angle, and Gait Profile Score.")
     layout |= {
-        "height": 60 + 26 * len(view.rows),
+        "height": 60 + 22 * len(view.rows),
         "margin": {"t": 30, "b": 40, "l": 130, "r": 14},
         "barmode": "group",
         "xaxis": {"title": {"text": "Gait Variable Score (degrees)", "font": {"size": 11}}, "rangemode": "tozero"},
