@@ -197,6 +197,7 @@ def document(walks: Mapping[str, Rows], people: Sequence[Person]) -> str:
         coverage=coverage_table(people) if people else "",
         primary=primary_table(people) if people else "",
         published=published_table(people) if people else "",
+        pairs_of_days=2 * len(people),
         alone=sum(not walker.judged(day) for walker in people for day in (1, 2)),
     )
 
@@ -245,7 +246,7 @@ N m/kg or degrees. *Changed*: called so without a change, of all outcomes, witho
 
 {primary}
 
-A day with a single stride on plates shows no spread: *cannot be judged*, and not counted ({alone} comparisons of days).
+A day with a single stride on plates shows no spread: *cannot be judged*, and not counted ({alone} of {pairs_of_days} pairs of days).
 
 The true value is that of the posture without differences between walks, at the true contacts of that posture. Contacts
 that no plate measured come from the motion; the deviations allow for 10 ms, by foot and kind of contact. Contacts that
@@ -266,10 +267,8 @@ rotation. Published values hold the differences of one person's gait between day
 
 - On the third day knees hyperextend to 13 to 16 degrees. The estimate expects few to go beyond 10 (SD 5), and pulls
   them back: in three people the knee angle of mid-stance was too flexed by 1.0 degrees more than without the change,
-  without the limits by 0.4. What such knees change is shown a little too small.
-- Before contacts were read from plates and events rather than frames, and before the deviations allowed for them, knee
-  angles with a change were covered in 85 % (sixteen people), knee flexion moments in loading in 75 %.
-- Intervals of subtalar, lumbar and pelvis angles are longer than the errors are.
+  without the limits by 0.4. What such knees change is shown a little too small, and covered least.
+- Intervals of ankle, subtalar, lumbar and pelvis angles are longer than the errors are.
 - Three markers show the pelvis, and one of them 6 mm off tilts it by 2 degrees. Marker places are therefore taken as
   10 mm uncertain between days: with 7 mm, hip angles of two people were covered in 67 %, with 10 mm in 87 %.
 - Forty people are the default; the table says how many were run, and its standard errors count them.
