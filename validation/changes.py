@@ -246,7 +246,8 @@ N m/kg or degrees. *Changed*: called so without a change, of all outcomes, witho
 
 {primary}
 
-A day with a single stride on plates shows no spread: *cannot be judged*, and not counted ({alone} of {pairs_of_days} pairs of days).
+A day with a single stride on plates shows no spread: *cannot be judged*, and not counted ({alone} of {pairs_of_days}
+pairs of days).
 
 The true value is that of the posture without differences between walks, at the true contacts of that posture. Contacts
 that no plate measured come from the motion; the deviations allow for 10 ms, by foot and kind of contact. Contacts that
