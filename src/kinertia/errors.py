@@ -6,14 +6,19 @@ attributes. The command line prints the message as one line and exits with statu
 
 from __future__ import annotations
 
+import os
+import re
 import traceback
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Self
 
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Quantity, Where
+
+_DRIVE = re.compile(r"[A-Za-z]:[\\/]")
 
 
 def problem_of(found: Finding) -> str:
@@ -127,6 +132,74 @@ class FileError(KinertiaError):
         where = replace(found.where, file=Path(path).name or str(path), line=line)
         placed = replace(found, where=where, severity=Severity.ERROR)
         return cls(path, problem_of(placed), line).with_finding(placed)
+
+
+def expect_file(path: Path, expected: str = "a file") -> None:
+    """Raise a FileError that states the folder and the nearest names in it, unless `path` is a file."""
+    if os.path.isfile(path):
+        return
+    if os.path.isdir(path):
+        raise wrong_kind(path, "A folder", "be read here", expected)
+    raise FileError.found(path, "F101", **missing_file(path, str(path), expected))
+
+
+def expect_path(path: Path) -> None:
+    """Raise a FileError unless a file or folder has this path."""
+    if not os.path.exists(path):
+        raise FileError.found(path, "F101", **missing_file(path, str(path), "a recording, a subject file or a folder"))
+
+
+def wrong_kind(path: Path, given: str, what: str, expected: str) -> FileError:
+    """Return the error that `given` "cannot {what}; expected {expected}"."""
+    return FileError.found(path, "F102", given=Quantity(given), what=Quantity(what), expected=Quantity(expected))
+
+
+def mismatch(path: Path, kind: str, found: str, expected: str, line: int | None = None) -> FileError:
+    """Return the error that the content "is not {kind}: found {found}, expected {expected}"."""
+    return FileError.found(path, "F103", line, found=Quantity(found), kind=Quantity(kind), expected=Quantity(expected))
+
+
+def malformed(path: Path, line: int | None, found: str, expected: str, **known: Quantity) -> FileError:
+    """Return the error of a cell or row: "found {found}; expected {expected}"; `cell` and `column` for one cell."""
+    return FileError.found(path, "F105", line, **known, found=Quantity(found), expected=Quantity(expected))
+
+
+def missing_file(path: Path, written: str, expected: str = "", is_folder: bool = False) -> dict[str, Quantity]:
+    """Return evidence of F101: the file, the folder that was searched, and similar names in it.
+
+    Args:
+        path: path that leads to no file.
+        written: the path as the user wrote it.
+        expected: what it should be, in words.
+        is_folder: whether it should be a folder: then names of files are no help.
+    """
+    folder = path.parent.absolute()
+    exists = os.path.isdir(folder)
+    beside = [entry for entry in folder.iterdir() if entry.is_dir() or not is_folder] if exists else []
+    names = {entry.name.lower(): entry.name for entry in beside if entry.name[0] != "."}
+    nearest = [names[near] for near in get_close_matches(path.name.lower(), sorted(names), n=3, cutoff=0.4)]
+    hint = "nothing there has a similar name" if exists else "that folder does not exist"
+    if nearest:
+        hint = f"the nearest name{'s' * (len(nearest) > 1)} there: {', '.join(nearest)}"
+    hint = _foreign_path(written) or hint
+    if expected not in ("", "a file"):
+        hint += f" (expected {expected})"
+    evidence = {"nearest": Quantity(", ".join(nearest))} if nearest else {}
+    words = {"file": _printable(path.name), "folder": _printable(str(folder)), "hint": hint}
+    return evidence | {name: Quantity(text) for name, text in words.items()}
+
+
+def _printable(text: str) -> str:
+    return text if text.isprintable() else ascii(text)
+
+
+def _foreign_path(written: str) -> str:
+    """Explain why a path leads nowhere, where it is written in Windows' notation; empty if that is not the reason."""
+    if any(ord(letter) < 32 for letter in written):
+        return "the path has a tab or line end, which TOML makes of \\t and \\n in double quotes: write / instead of \\"
+    if _DRIVE.match(written) and not Path(written).is_absolute():
+        return f"drive {written[:2]} of Windows is not on this computer: give the path from here"
+    return ""
 
 
 def wrong_entry(entry: str, expected: str, known: Mapping[str, Quantity] | None = None) -> Finding:

@@ -10,8 +10,8 @@ import typer
 from command_line import fitted, run
 from generic_static import recording, standing_positions
 from kinertia.cli import drafts
+from kinertia.io.file_names import command_line
 from kinertia.io.marker_set_file import read_marker_set
-from kinertia.io.subject.provenance import command_line
 from kinertia.io.subject.reader import read_subject
 from kinertia.io.text.trc import write_trc
 

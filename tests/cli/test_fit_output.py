@@ -12,7 +12,7 @@ from kinertia.cli import common
 from kinertia.cli.findings import report_tables
 from kinertia.findings.finding import Severity, finding
 from kinertia.findings.quantity import Quantity
-from kinertia.report.exports.files import summary
+from kinertia.report.exports.contents import summary
 from synthetic_lab import synthetic_arguments
 
 
@@ -39,7 +39,7 @@ MASSES = {"stated": "measured", "literature": "literature", "estimate": "estimat
 def test_tables_are_short_readable_and_say_what_was_used(fit, two_level):
     for result in (fit, two_level):
         with common.out.capture() as captured:
-            report_tables(result)
+            report_tables(result, summary(result))
         lines = captured.get().splitlines()
         assert max(len(line) for line in lines if not line.startswith("assumed: ")) <= 80
         assert len(lines) < 90
@@ -66,7 +66,8 @@ def test_a_fit_with_a_model_says_model_and_what_is_kept(fit):
     prior_sd[-1] = sd[-1] = 0.0
     posterior = replace(fit.posterior, prior_sd=prior_sd, sd=sd)
     with common.out.capture() as captured:
-        report_tables(replace(fit, posterior=posterior, file=SimpleNamespace(bsp=fit.estimate)))
+        shown = replace(fit, posterior=posterior, file=SimpleNamespace(bsp=fit.estimate))
+        report_tables(shown, summary(shown))
     shown = captured.get()
     assert "literature" not in shown.replace("from the literature", "")
     assert re.search(r"RMS \(max\), +model +corrected +estimate", shown)

@@ -16,9 +16,10 @@ from kinertia.errors import SessionError
 from kinertia.estimation.learnt_prior import information_of
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.result.drawn_fit import drawn_fit
+from kinertia.io.file_names import command_line
 from kinertia.io.norms_file import read_norms
 from kinertia.io.subject.learnt_files import PersonInstruments, read_session
-from kinertia.io.subject.provenance import Provenance, command_line, recordings
+from kinertia.io.subject.provenance import Provenance, recordings
 from kinertia.io.subject.reader import read_subject
 from kinertia.report.exports.saved_fit import FIT_FILE, write_fit
 from kinertia.settings import Instruments

@@ -4,7 +4,7 @@ import pytest
 
 from kinertia.cohort.people import Participant, people_of
 from kinertia.errors import FileError
-from kinertia.io.subject.provenance import command_line
+from kinertia.io.file_names import command_line
 
 
 def person(folder, *files):

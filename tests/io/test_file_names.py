@@ -2,7 +2,8 @@
 
 import pytest
 
-from kinertia.io.file_names import fits_everywhere, missing_file, path_from, same_folder
+from kinertia.errors import missing_file
+from kinertia.io.file_names import fits_everywhere, path_from, same_folder
 
 
 @pytest.mark.parametrize(

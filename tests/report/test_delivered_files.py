@@ -13,11 +13,12 @@ from scipy.interpolate import make_interp_spline
 from command_line import fitted
 from kinertia.io.ground_forces import read_forces
 from kinertia.io.text.sto import TimeTable, read_sto, write_table
-from kinertia.report.exports.opensim_files import FORCES_FILE, LOADS_FILE
 from kinertia.trial.data import LOAD_THRESHOLD_N
 from kinertia.trial.ground_contact import centre_of_pressure
 from osim_tools import inverse_dynamics_tool
 from validation.walks import fit_arguments
+
+FORCES_FILE, LOADS_FILE = "ground_reactions.mot", "external_loads.xml"
 
 RESIDUAL = 0.02
 """Of RMS; the moments that OpenSim gives are about the axes of tilt, list and rotation, which are nearly square."""

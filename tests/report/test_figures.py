@@ -12,8 +12,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from kinertia.model.skeleton import by_side
 from kinertia.report.figures.body_figure import body_figure
-from kinertia.report.figures.bsp_figures import change_figure, departure_figure, departures, information_figure
+from kinertia.report.figures.bsp_figures import change_figure, departure_figure, information_figure
 from kinertia.report.figures.coordinate_titles import panels_of, title_of
 from kinertia.report.figures.figure import BLUE, SIDES, Figure, Panel, between, compact, faded, small_multiples
 from kinertia.report.figures.marker_figures import fit_gap_figure, marker_figure
@@ -23,7 +24,6 @@ from kinertia.report.figures.time_figures import (
     coordinate_figure,
     joint_moment_figure,
     moment_figure,
-    motion_change,
     residual_figure,
     stage_name,
 )
@@ -211,7 +211,7 @@ def estimates(figure):
 
 def test_intervals_are_those_of_the_posterior(fit):
     figure = as_plotly(departure_figure(fit, range(10)))
-    away, posterior = departures(fit), fit.posterior
+    away, posterior = fit.departures, fit.posterior
     intervals = estimates(figure)
     assert len(intervals) == away.size
     np.testing.assert_allclose(
@@ -332,9 +332,8 @@ def test_compact_panels_share_the_labels_below_them():
 
 
 def test_coordinates_without_a_partner_keep_their_names():
-    skeleton = SimpleNamespace(
-        name="mine", coordinates=("tilt", "hip_r", "hip_l", "knee_r"), rotational=np.array([True] * 4)
-    )
+    names = ("tilt", "hip_r", "hip_l", "knee_r")
+    skeleton = SimpleNamespace(name="mine", coordinates=names, sides=by_side(names), rotational=np.array([True] * 4))
     assert [(coordinate.title, coordinate.columns) for coordinate in panels_of(skeleton)] == [
         ("tilt", {"": 0}),
         ("hip", {"r": 1, "l": 2}),
@@ -346,7 +345,7 @@ def test_coordinates_without_a_partner_keep_their_names():
 def test_change_of_motion_matches_the_curves(fit):
     trial = fit.trials[0]
     figure = coordinate_figure(trial, fit.skeleton)
-    change = np.degrees(motion_change(trial)[:, np.asarray(fit.skeleton.rotational)])
+    change = np.degrees(trial.motion_change[:, np.asarray(fit.skeleton.rotational)])
     assert f"{np.sqrt(np.nanmean(change**2)):.1f} degrees RMS" in figure.alt
 
 
@@ -388,7 +387,7 @@ def test_departures_are_from_the_prior_where_more_is_known_than_the_literature(f
     told = replace(fit, posterior=replace(fit.posterior, prior_mean=fit.estimate))
     assert not fit.more_known
     assert told.more_known
-    np.testing.assert_array_equal(departures(told), np.zeros_like(departures(fit)))
+    np.testing.assert_array_equal(told.departures, np.zeros_like(fit.departures))
     assert "Change against the prior by the estimate" in change_figure(told).alt
     of_before = replace(fit, posterior=replace(fit.posterior, prior_mean=None))
     assert of_before.expected is fit.literature

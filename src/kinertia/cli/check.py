@@ -31,13 +31,12 @@ from kinertia.cli.common import (
     shown_progress,
 )
 from kinertia.cli.findings import show_idle_waivers, show_overview, waivers_reported
-from kinertia.errors import FileError
+from kinertia.errors import FileError, expect_path
 from kinertia.estimation.prepared import Progress
 from kinertia.findings.overview import Overview
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.opensim.reader import read_osim
 from kinertia.io.subject.reader import expect_one_model, read_subject, subject_file_in
-from kinertia.io.text.number_table import expect_path
 from kinertia.model.anthropometry import check_subject
 from kinertia.report.pages.check_page import save_check_page
 from kinertia.settings import Subject

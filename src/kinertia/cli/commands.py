@@ -18,8 +18,8 @@ import typer
 from kinertia.cli.common import add_command, err, of_error, out, print_json, show_error, show_problem
 from kinertia.errors import KinertiaError, internal_error
 from kinertia.findings.extensions import ExtensionError
+from kinertia.io.file_names import command_line
 from kinertia.io.output_folder import INTERRUPTIONS
-from kinertia.io.subject.provenance import command_line
 from kinertia.io.versions import VERSION
 
 # typer keeps these line ends: at most 78 columns

@@ -18,15 +18,17 @@ from kinertia.cli.common import Outcome, Output, Overwrite, Quiet, out, plain_ta
 from kinertia.cli.findings import show_coverage, show_overview
 from kinertia.estimation.prepared import Progress
 from kinertia.estimation.result.fit import Fit
+from kinertia.io.file_names import command_line
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.samples import SHA256, sample_walk
 from kinertia.io.subject.person_recordings import read_inputs
-from kinertia.io.subject.provenance import command_line, provenance_of
+from kinertia.io.subject.provenance import provenance_of
 from kinertia.io.subject.reader import read_subject, with_settings
 from kinertia.io.subject.tables import SubjectFile
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import inverse_dynamics
-from kinertia.report.exports.files import save_fit, summary
+from kinertia.report.exports.contents import summary
+from kinertia.report.exports.files import save_fit
 from kinertia.report.pages.truth_comparison import Truth
 from kinertia.synthetic.laboratory import LabNoise, record, write_lab
 from kinertia.synthetic.walk import SyntheticTrial, unlike_literature, walk, walking_subject

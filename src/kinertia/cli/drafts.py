@@ -11,15 +11,14 @@ import typer
 
 from kinertia.cli.common import Height, Mass, Outcome, Sex, number, out, plain_table
 from kinertia.cli.common import sex as parsed_sex
-from kinertia.errors import FileError
-from kinertia.io.file_names import missing_file
+from kinertia.errors import FileError, missing_file
+from kinertia.io.file_names import command_line
 from kinertia.io.marker_set_draft import draft_marker_set, preset_of
 from kinertia.io.marker_set_file import nearest_preset, preset_name, preset_names, read_marker_set
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.recording import read_recording
 from kinertia.io.subject.body_files import measures_sheet
 from kinertia.io.subject.draft import FILL_IN, MARKER_SET, NO_FORCES, NOT_USED, SUBJECT, init_files
-from kinertia.io.subject.provenance import command_line
 from kinertia.model.marker_set import fits_person, label_share, spelled_as
 from kinertia.report.figures.measures_picture import measures_picture
 from kinertia.trial.data import Recording

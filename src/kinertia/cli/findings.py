@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
@@ -13,16 +13,14 @@ import typer
 
 from kinertia.cli.common import Outcome, out, plain_table
 from kinertia.errors import KinertiaError, SettingsError, findings_of
-from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.leg_moments import coverage_sentence
 from kinertia.findings.display import outlined
 from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.overview import Group, Overview, consequences, grouped, in_order, reported
 from kinertia.findings.rule import STAGES, Rule, all_rules, family_title, matching, nearest, page, rule
-from kinertia.io.subject.provenance import command_line
+from kinertia.io.file_names import command_line
 from kinertia.io.subject.tables import Model
-from kinertia.report.exports.files import summary
 from kinertia.report.wording import start_of
 
 if TYPE_CHECKING:
@@ -89,6 +87,18 @@ def show_idle_waivers(codes: Sequence[str], findings: Sequence[Finding], stages:
 
 
 @contextmanager
+def failure_explained(codes: Sequence[str], given: Path, model: Model, command: str) -> Iterator[None]:
+    """Add the next commands to an error that ends the command, and show which codes of `--waive` had no effect."""
+    with waivers_reported(codes):
+        try:
+            yield
+        except KinertiaError as error:
+            for line in next_commands(error, given, model, command):
+                error.add_note(line)
+            raise
+
+
+@contextmanager
 def waivers_reported(codes: Sequence[str]) -> Iterator[None]:
     """Show which codes of `--waive` had no effect where an error ends the command."""
     try:
@@ -118,9 +128,8 @@ def show_coverage(fit: Fit) -> None:
         out.print(f"joint moments {covered}", soft_wrap=True)
 
 
-def report_tables(fit: Fit) -> None:
-    """Show person and method, residuals of every trial, the table of segments, and masses."""
-    fit_summary = summary(fit)
+def report_tables(fit: Fit, fit_summary: Mapping[str, Any]) -> None:
+    """Show person and method, residuals of every trial, the table of segments, and masses, given `fit.json`."""
     subject, mass = fit_summary["subject"], fit_summary["total_mass_kg"]
     height = None if subject["height_m"] is None else f"{subject['height_m']:g} m"
     person = ", ".join(filter(None, [f"{subject['mass_kg']:g} kg", height, subject["sex"]]))
@@ -185,9 +194,7 @@ def _bsp_table(fit: Fit) -> Table:
             inertia = (f"{value:.4f}" for value in bsp.inertia_kgm2[i].diagonal())
             cells = [f"{bsp.mass_kg[i]:.2f}", *com, *inertia]
             if source == "estimate" and fit.posterior is not None:
-                cells = [
-                    cell + _MARKS[evidence(a)] for cell, a in zip(cells, fit.posterior.information[i], strict=False)
-                ]
+                cells = [cell + _MARKS[word] for cell, word in zip(cells, fit.evidence[i], strict=False)]
             table.add_row(segment, source, *cells)
             segment = ""
         if fit.posterior is not None and not fit.posterior.prior_sd[i].any():
@@ -216,7 +223,8 @@ def next_commands(error: KinertiaError, given: Path, model: Model, command: str)
     folder = given if given.is_dir() else given.parent
     by_file = given.is_dir() or given.suffix.lower() == ".toml"
     drafted = folder / _DRAFT if by_file else Path(_DRAFT)
-    draft = command_line(["kinertia", "markers", _as_typed(model.static), "-o", str(drafted)])
+    static = _as_typed(model.static)
+    draft = command_line(["kinertia", "markers", static, "-o", str(drafted)])
     if by_file:
         return [draft, f'put markers = "{_DRAFT}" under [model] of the subject file', command]
     return [draft, f"{command} --markers {_DRAFT}"]

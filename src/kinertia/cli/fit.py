@@ -1,6 +1,6 @@
 """Defines `kinertia fit`: from a subject file, or from options, to a folder of results."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, get_args
@@ -32,22 +32,20 @@ from kinertia.cli.common import (
     shown_progress,
 )
 from kinertia.cli.findings import (
-    next_commands,
+    failure_explained,
     report_tables,
     show_coverage,
     show_idle_waivers,
     show_overview,
-    waivers_reported,
 )
-from kinertia.errors import FileError, KinertiaError
-from kinertia.estimation.result.fit import Fit
-from kinertia.io.file_names import same_folder
+from kinertia.errors import FileError, KinertiaError, expect_path
+from kinertia.io.file_names import command_line, same_folder
 from kinertia.io.recording import expect_recording
-from kinertia.io.subject.provenance import command_line, provenance_of
-from kinertia.io.subject.reader import read_subject, subject_file_in, subject_from_options, with_settings
+from kinertia.io.subject.provenance import provenance_of
+from kinertia.io.subject.reader import read_subject, subject_from_options, with_settings
 from kinertia.io.subject.tables import SubjectFile
-from kinertia.io.text.number_table import expect_path
-from kinertia.report.exports.files import FIT_FILES, TRIAL_FILES, save_fit, summary
+from kinertia.report.exports.contents import FitContent, content_of
+from kinertia.report.exports.files import FIT_FILES, TRIAL_FILES, write_content
 from kinertia.settings import Overrule, Settings
 from kinertia.workflow.from_files import fit_subject
 
@@ -121,12 +119,18 @@ def fit(
     }
     runs = _runs(trials, output, options, method, overrule_of(waive))
     for run in runs:
-        _expect_folder(run, overwrite)
+        names = [trial.name for trial in run.wanted.trials]
+        several = len(names) > 1
+        files = FIT_FILES if several else (*FIT_FILES, *TRIAL_FILES)
+        results_folder(run.folder, overwrite, names if several else (), files)
     summaries, status = [], 0
     for run in runs:
         try:
-            with waivers_reported(run.overrule.waive):
-                result = _fitted(run)
+            with failure_explained(run.overrule.waive, run.given, run.wanted.model, run.command):
+                with shown_progress() as progress:
+                    result = fit_subject(run.wanted, progress, run.overrule)
+                content = content_of(result, provenance_of(run.wanted, run.command))
+                write_content(content, run.folder, force=True)
         except KinertiaError as error:
             if len(runs) == 1:
                 raise
@@ -135,27 +139,32 @@ def fit(
             status = 2
             continue
         status = max(status, int(result.overview.failed))
-        summaries.append({"folder": str(run.folder), **summary(result), "bsp": _bsp_rows(result)})
+        summaries.append({"folder": str(run.folder), **content.summary, "bsp": _rows(content.tables["bsp.csv"])})
         if not quiet:
-            _show(result, run, verbose, shown_table)
+            _show(content, run, verbose, shown_table)
     return Outcome(summaries if len(runs) > 1 else summaries[0], status)
 
 
-def _bsp_rows(fit: Fit) -> list[dict[str, Any]]:
-    """Return the rows of `bsp.csv`."""
-    columns = {name: np.asarray(values).tolist() for name, values in fit.bsp_columns().items()}
-    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+def _rows(columns: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the rows of a table."""
+    plain = {name: np.asarray(values).tolist() for name, values in columns.items()}
+    return [dict(zip(plain, row, strict=True)) for row in zip(*plain.values(), strict=True)]
 
 
 @dataclass(frozen=True)
 class _Run:
-    """One person's run: what was given, the subject file, the folder for results, and the command that repeats it."""
+    """One person's run: what was given, the folder for results, words of the command that repeats it, subject file."""
 
     given: Path
-    wanted: SubjectFile
     folder: Path
-    command: str
+    words: Sequence[str]
+    wanted: SubjectFile
     overrule: Overrule
+
+    @property
+    def command(self) -> str:
+        """The command that repeats it."""
+        return command_line(self.words)
 
 
 def _runs(
@@ -177,27 +186,20 @@ def _runs(
     return [
         _Run(
             path,
-            _wanted(path, options, method),
             folder,
             _command(path, {**options, "--waive": overrule.waive or None}, method, folder),
+            _wanted(path, options, method),
             overrule,
         )
         for path, folder in zip(trials, folders, strict=True)
     ]
 
 
-def _expect_folder(run: _Run, overwrite: bool) -> None:
-    """Raise an error, before any work, if the results of a run cannot or may not go to its folder."""
-    names = [trial.name for trial in run.wanted.trials]
-    several = len(names) > 1
-    files = FIT_FILES if several else (*FIT_FILES, *TRIAL_FILES)
-    results_folder(run.folder, overwrite, names if several else (), files)
-
-
-def _show(fit: Fit, run: _Run, verbose: bool, tables: bool) -> None:
+def _show(content: FitContent, run: _Run, verbose: bool, tables: bool) -> None:
     """Show verdict and findings of a fit and the folder of its results, with tables where they are wanted."""
+    fit = content.fit
     if verbose or tables:
-        report_tables(fit)
+        report_tables(fit, content.summary)
     show_overview(fit.overview, verbose)
     show_idle_waivers(run.overrule.waive, fit.overview.findings)
     show_coverage(fit)
@@ -209,24 +211,11 @@ def _name(path: Path) -> str:
     return path.resolve().name if path.is_dir() else path.resolve().parent.name if path.stem == "subject" else path.stem
 
 
-def _fitted(run: _Run) -> Fit:
-    """Fit one person and save the results in the folder."""
-    with shown_progress() as progress:
-        try:
-            result = fit_subject(run.wanted, progress, run.overrule)
-        except KinertiaError as error:
-            for line in next_commands(error, run.given, run.wanted.model, run.command):
-                error.add_note(line)
-            raise
-    save_fit(result, run.folder, provenance_of(run.wanted, run.command), force=True)
-    return result
-
-
-def _command(trial: Path, options: dict[str, Any], method: str | None, output: Path) -> str:
-    """Return the command line that repeats this run."""
+def _command(trial: Path, options: dict[str, Any], method: str | None, output: Path) -> list[str]:
+    """Return the words of the command line that repeats this run."""
     given = {**options, "--method": method, "-o": output}
     words = [str(word) for name, value in given.items() if value is not None for word in _words(name, value)]
-    return command_line(["kinertia", "fit", str(trial), *words])
+    return ["kinertia", "fit", str(trial), *words]
 
 
 def _words(name: str, value: Any) -> list[Any]:
@@ -238,22 +227,18 @@ def _words(name: str, value: Any) -> list[Any]:
 
 def _wanted(trial: Path, options: dict[str, Any], method: str | None) -> SubjectFile:
     """Return what to estimate, from the subject file or from options."""
-    if not trial.suffix:
-        expect_path(trial)
-    if trial.is_dir():
-        trial = subject_file_in(trial)
-    if trial.suffix.lower() == ".toml":
-        given = [name for name, value in options.items() if value is not None]
-        if given:
-            raise FileError(trial, f"a subject file contains everything; put {', '.join(given)} into it instead")
-        wanted = read_subject(trial)
+    if trial.suffix.lower() != ".toml" and not trial.is_dir():
+        content = _content(trial, options)
+        wanted = subject_from_options(content)
+    elif given := [name for name, value in options.items() if value is not None]:
+        raise FileError(trial, f"a subject file contains everything; put {', '.join(given)} into it instead")
     else:
-        wanted = _from_options(trial, options)
+        wanted = read_subject(trial)
     return wanted if method is None else with_settings(wanted, method=method)
 
 
-def _from_options(trial: Path, options: dict[str, Any]) -> SubjectFile:
-    """Build the subject file that these options represent."""
+def _content(trial: Path, options: dict[str, Any]) -> dict[str, Any]:
+    """Return the content of the subject file that these options represent."""
     given = {
         key: str(value) if isinstance(value, Path) else value for key, value in options.items() if value is not None
     }
@@ -275,6 +260,4 @@ def _from_options(trial: Path, options: dict[str, Any]) -> SubjectFile:
         for table, entries in names.items()
     }
     trials = [{"markers": str(trial), **tables["trial"]}]
-    return subject_from_options(
-        {"subject": {"name": trial.stem, **tables["subject"]}, "model": tables["model"], "trial": trials}
-    )
+    return {"subject": {"name": trial.stem, **tables["subject"]}, "model": tables["model"], "trial": trials}

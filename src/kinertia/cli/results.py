@@ -12,7 +12,7 @@ from kinertia.errors import FileError
 from kinertia.estimation.result.cycles import columns_of
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.gait_scores import with_norms
-from kinertia.estimation.result.mean_cycles import check_convention, gait_profile
+from kinertia.estimation.result.mean_cycles import check_convention, gait_profile, profiles_by_task
 from kinertia.io.norms_file import Norm, read_norms
 from kinertia.io.output_folder import complete_folder, updated_files
 from kinertia.io.subject.provenance import names_from_common_folder
@@ -34,7 +34,6 @@ from kinertia.report.exports.c3d_results import write_c3d_results
 from kinertia.report.exports.files import write_columns, write_draws
 from kinertia.report.exports.saved_fit import read_saved
 from kinertia.report.exports.workbook import write_csv, write_json, write_mat, write_xlsx
-from kinertia.report.figures.cycle_figures import CurvesByStage, drawn_curves
 from kinertia.report.pages.file_outputs import outputs_sentence
 from kinertia.report.pages.page import Template, render
 
@@ -164,10 +163,9 @@ def report(
     kinertia report out --norms adults.csv --letter
     """
     saved = read_saved(results)
-    curves = drawn_curves(saved.fit)
-    bands, without_curve = ({}, []) if norms is None else _norms_for(saved.fit, curves, norms)
+    bands, without_curve = ({}, []) if norms is None else _norms_for(saved.fit, norms)
     profile = gait_profile(saved.fit, bands) if set(CLINICAL_ANGLES) <= set(bands) else None
-    content = (saved.fit, saved.provenance, saved.versions, bands, saved.truth, curves)
+    content = (saved.fit, saved.provenance, saved.versions, bands, profiles_by_task(saved.fit, bands), saved.truth)
     pages: dict[str, Template] = {"report.html": "report"}
     if letter:
         pages[LETTER] = "letter"
@@ -176,7 +174,7 @@ def report(
             (work / name).write_text(render(*content, template), encoding="utf-8", newline="\n")
         cycles = bands or (results / "cycles.csv").is_file()
         if cycles and any(trial.strides for trial in saved.fit.trials):
-            columns = columns_of(curves["estimate"])
+            columns = columns_of(saved.fit.curves["estimate"])
             columns = with_norms(columns, bands, saved.fit.skeleton) if bands else columns
             write_columns(work / "cycles.csv", columns, "%.6g")
         if profile:
@@ -199,9 +197,9 @@ def score_text(degrees: float) -> str:
     return f"{degrees:.1f} degrees" if np.isfinite(degrees) else "not available: one side has no complete curves"
 
 
-def _norms_for(fit: Fit, curves: CurvesByStage, path: Path) -> tuple[dict[str, Norm], list[str]]:
+def _norms_for(fit: Fit, path: Path) -> tuple[dict[str, Norm], list[str]]:
     """Read the norms in a file, and list those for which this fit has no curve."""
-    norms, known = read_norms(path), {curve.quantity for curve in curves["estimate"]}
+    norms, known = read_norms(path), {curve.quantity for curve in fit.curves["estimate"]}
     check_convention(fit, norms)
     unknown = sorted(set(norms) - known)
     if len(unknown) == len(norms):

@@ -5,9 +5,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from kinertia.errors import FileError
-from kinertia.io.file_names import RESULT_FILES, fits_everywhere, path_from, same_name_key
+from kinertia.io.file_names import RESULT_FILES, command_line, fits_everywhere, path_from, same_name_key
 from kinertia.io.subject.draft import is_capture
-from kinertia.io.subject.provenance import command_line
 from kinertia.io.subject.reader import subject_file_in
 from kinertia.io.text.csv_file import read_csv
 

@@ -20,7 +20,7 @@ from kinertia.cohort.paired import PersonChanges, means_of
 from kinertia.cohort.record import AGAINST, PASSED, Place, Record
 from kinertia.errors import FileError, KinertiaError, findings_of
 from kinertia.estimation.changes.change import SOURCES
-from kinertia.estimation.result.cycles import UNITS, cycle_columns
+from kinertia.estimation.result.cycles import UNITS, columns_of
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.gait_scores import OVERALL
 from kinertia.estimation.result.mean_cycles import gait_profile
@@ -31,9 +31,9 @@ from kinertia.io.norms_file import Norm
 from kinertia.io.text.csv_file import inert, read_csv
 from kinertia.io.working_folder import working_folder
 from kinertia.report.comparison.change_tables import group_columns
-from kinertia.report.exports.files import summary
+from kinertia.report.exports.contents import summary
 from kinertia.report.exports.saved_fit import load_fit
-from kinertia.report.figures.cycle_figures import MOST_STRIDES, titled_quantities
+from kinertia.report.figures.cycle_figures import titled_quantities
 
 if TYPE_CHECKING:
     import pyarrow
@@ -265,7 +265,7 @@ def _cycles(fit: Fit) -> dict[str, Any]:
     """Return the rows of the person's `cycles.csv`, and the title of each curve in the person's figures with its
     positive direction, in which models differ.
     """
-    columns = cycle_columns(fit.trials, fit.mass_kg, "estimate", MOST_STRIDES)
+    columns = columns_of(fit.curves["estimate"])
     titles = {name: title for kind in UNITS for name, title in titled_quantities(fit.skeleton, kind)}
     return {**columns, "title": [titles.get(quantity, "") for quantity in columns["quantity"]]}
 

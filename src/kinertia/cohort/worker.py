@@ -27,9 +27,10 @@ from kinertia.cohort.tables import write_findings, write_person
 from kinertia.errors import KinertiaError, internal_error
 from kinertia.estimation.result.fit import Fit
 from kinertia.findings.finding import Severity
+from kinertia.io.file_names import command_line
 from kinertia.io.output_folder import complete_folder, write_then_rename
 from kinertia.io.subject.person_recordings import session_date
-from kinertia.io.subject.provenance import command_line, provenance_of
+from kinertia.io.subject.provenance import provenance_of
 from kinertia.io.subject.reader import read_subject
 from kinertia.io.subject.tables import SubjectFile
 from kinertia.io.versions import VERSION

@@ -79,7 +79,11 @@ def rule(code: str) -> Rule:
 def rules(family: str) -> dict[str, Rule]:
     """Read all rules of a family by code; empty where there is no such family."""
     entries = {code: entry for code, entry in _read(family).items() if len(code) == 4}
-    return {code: _rule(code, entry) for code, entry in entries.items()}
+    plain: dict[str, dict[str, Any]] = {
+        code: {name: tuple(value) if isinstance(value, list) else value for name, value in entry.items()}
+        for code, entry in entries.items()
+    }
+    return {code: Rule(code, **entry) for code, entry in plain.items()}
 
 
 @cache
@@ -114,11 +118,6 @@ def family_title(family: str) -> str:
 def page(code: str) -> str:
     """Return the documentation page and anchor of a code or question: "findings/force-plates.md#p213"."""
     return f"findings/{family_title(code[:1]).lower().replace(' ', '-')}.md#{code.lower()}"
-
-
-def _rule(code: str, entry: dict[str, Any]) -> Rule:
-    named: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in entry.items()}
-    return Rule(code, **named)
 
 
 @cache

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.errors import FileError
-from kinertia.io.text.number_table import expect_file
+from kinertia.errors import FileError, expect_file
 from kinertia.trial.data import Markers, PlateLoads, Recording
 
 _HOW = (

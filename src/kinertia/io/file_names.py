@@ -1,19 +1,17 @@
-"""Makes names of files and folders valid on every system, and reads Windows paths elsewhere."""
+"""Makes names of files and folders valid on every system, reads Windows paths elsewhere, and quotes for shells."""
 
 import os
 import re
+import shlex
+import subprocess
 import unicodedata
 from collections.abc import Sequence
-from difflib import get_close_matches
 from pathlib import Path
-
-from kinertia.findings.quantity import Quantity
 
 _DEVICES = re.compile(r"(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³]) *", re.IGNORECASE)
 _FORBIDDEN = re.compile(r'[<>:"/\\|?*\x00-\x1f]|[ .]$')
 RESULT_FILES = ("fit.json", "report.html", "bsp.csv", "model.osim", "model_changes.csv")
 """Result files beside the folders of several trials."""
-_DRIVE = re.compile(r"[A-Za-z]:[\\/]")
 
 
 def fits_everywhere(name: str) -> bool:
@@ -68,39 +66,7 @@ def _at_home(written: str) -> Path:
         return Path(written)
 
 
-def missing_file(path: Path, written: str, expected: str = "", is_folder: bool = False) -> dict[str, Quantity]:
-    """Return evidence of F101: the file, the folder that was searched, and similar names in it.
-
-    Args:
-        path: path that leads to no file.
-        written: the path as the user wrote it.
-        expected: what it should be, in words.
-        is_folder: whether it should be a folder: then names of files are no help.
-    """
-    folder = path.parent.absolute()
-    exists = os.path.isdir(folder)
-    beside = [entry for entry in folder.iterdir() if entry.is_dir() or not is_folder] if exists else []
-    names = {entry.name.lower(): entry.name for entry in beside if entry.name[0] != "."}
-    nearest = [names[near] for near in get_close_matches(path.name.lower(), sorted(names), n=3, cutoff=0.4)]
-    hint = "nothing there has a similar name" if exists else "that folder does not exist"
-    if nearest:
-        hint = f"the nearest name{'s' * (len(nearest) > 1)} there: {', '.join(nearest)}"
-    hint = _foreign_path(written) or hint
-    if expected not in ("", "a file"):
-        hint += f" (expected {expected})"
-    evidence = {"nearest": Quantity(", ".join(nearest))} if nearest else {}
-    words = {"file": _printable(path.name), "folder": _printable(str(folder)), "hint": hint}
-    return evidence | {name: Quantity(text) for name, text in words.items()}
-
-
-def _printable(text: str) -> str:
-    return text if text.isprintable() else ascii(text)
-
-
-def _foreign_path(written: str) -> str:
-    """Explain why a path leads nowhere, where it is written in Windows' notation; empty if that is not the reason."""
-    if any(ord(letter) < 32 for letter in written):
-        return "the path has a tab or line end, which TOML makes of \\t and \\n in double quotes: write / instead of \\"
-    if _DRIVE.match(written) and not Path(written).is_absolute():
-        return f"drive {written[:2]} of Windows is not on this computer: give the path from here"
-    return ""
+def command_line(words: Sequence[str], windows: bool = os.name == "nt") -> str:
+    """Join words to one line that a shell splits into these again: cmd and PowerShell do not support POSIX single
+    quotes."""
+    return subprocess.list2cmdline(words) if windows else shlex.join(words)

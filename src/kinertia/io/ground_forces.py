@@ -22,11 +22,11 @@ from pathlib import Path, PureWindowsPath
 
 import numpy as np
 
-from kinertia.errors import FileError
+from kinertia.errors import FileError, expect_file, mismatch
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.file_names import path_from
-from kinertia.io.text.number_table import expect_file, mismatch, uniform_times
+from kinertia.io.text.number_table import uniform_times
 from kinertia.io.text.sto import TimeTable, read_table
 from kinertia.model.anatomy import segment_of
 from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray, PlateLoads

@@ -9,10 +9,9 @@ from functools import cache
 from importlib import resources
 from pathlib import Path
 
-from kinertia.errors import FileError
+from kinertia.errors import FileError, expect_file
 from kinertia.findings.extensions import MARKER_SETS, loaded, names
 from kinertia.findings.quantity import Quantity
-from kinertia.io.text.number_table import expect_file
 from kinertia.io.text.toml_lines import TomlFile, parse_toml, read_toml
 from kinertia.model.marker_set import (
     LANDMARKS,

@@ -5,13 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from kinertia.errors import FileError, KinertiaError, TrialError
+from kinertia.errors import FileError, KinertiaError, TrialError, expect_file, wrong_kind
 from kinertia.findings.extensions import READERS, loaded, names
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.io.ground_forces import read_forces
 from kinertia.io.lab_plates import upright_along_z
-from kinertia.io.text.number_table import expect_file, wrong_kind
 from kinertia.io.text.trc import read_trc_recording
 from kinertia.model.static_landmarks import with_knees_of_device
 from kinertia.trial.data import FloatArray, PlateLoads, Recording

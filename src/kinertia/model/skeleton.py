@@ -122,6 +122,11 @@ class Skeleton:
         return tuple(joint.child for joint in self.joints)
 
     @cached_property
+    def sides(self) -> dict[str, dict[str, int]]:
+        """Columns of the coordinates, as `by_side` groups their names."""
+        return by_side(self.coordinates)
+
+    @cached_property
     def coordinates(self) -> tuple[str, ...]:
         """Names of the coordinates that move, root first (the order of q)."""
         return tuple(dict.fromkeys(axis.coordinate for axis in self._axes if axis.coordinate not in self.locked))
@@ -358,7 +363,7 @@ def mirrored(name: str) -> str:
 
 def opposite_on_left(skeleton: Skeleton) -> frozenset[str]:
     """Return the coordinates of pelvis and trunk that rotate about an axis in the plane of symmetry."""
-    sideless = {name for name, columns in by_side(skeleton.coordinates).items() if "" in columns}
+    sideless = {name for name, columns in skeleton.sides.items() if "" in columns}
     axes = [axis for joint in skeleton.joints for axis in joint.axes if axis.kind == "rotation"]
     return frozenset(
         axis.coordinate for axis in axes if axis.coordinate in sideless and abs(axis.direction[2]) < np.sqrt(0.5)

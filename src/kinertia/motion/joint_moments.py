@@ -146,11 +146,11 @@ def joint_wrenches(
     chosen, pose = leg_joints(skeleton) if joints is None else joints, pose or skeleton.pose(motion.q)
     if not chosen:
         return {}
-    about = skeleton.root.centre(motion.q)
+    about, beyond = skeleton.root.centre(motion.q), [_beyond(skeleton, joint) for joint in chosen]
     needed = segment_loads(skeleton, bsp, motion)
     ground = np.concatenate([foot_loads[..., :3], foot_loads[..., 3:]], axis=-1).copy()
     ground[..., 3:] -= np.cross(about[:, None], ground[..., :3])
-    loads = np.stack([needed[_beyond(skeleton, joint)].sum(axis=0) for joint in chosen])
+    loads = np.stack([needed[rows].sum(axis=0) for rows in beyond])
     for load, joint in zip(loads, chosen, strict=True):
         load -= ground[:, FEET.index(joint.side)] if joint.side else 0.0
     arms = np.stack([joint.centre(skeleton, pose) for joint in chosen]) - about

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.result.fit import Fit
-from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import Asymmetry, asymmetries
+from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import Asymmetry
 from kinertia.model.bsp import PARAMETERS, UNITS
 
 INTERVAL_SD = 1.96
@@ -70,9 +70,7 @@ def fixed(value: float, digits: int, sign: bool = False) -> str:
 
 def asymmetry_sentences(fit: Fit) -> list[str]:
     """State for each pair of limbs whether left and right differ beyond their error bars; nothing after two-level."""
-    if fit.posterior is None:
-        return []
-    pairs = asymmetries(fit.estimate, fit.posterior.covariance)
+    pairs = fit.asymmetries
     alike = [_said(pair.segment) for pair in pairs if not pair.differing]
     differing = [f"{_said(pair.segment)}: {_differences(pair)}" for pair in pairs if pair.differing]
     return [*differing, *([f"no difference beyond the error bars: {', '.join(alike)}"] if alike else [])]

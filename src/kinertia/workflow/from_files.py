@@ -16,7 +16,8 @@ from kinertia.estimation.prepared import Prepared, Progress
 from kinertia.estimation.result.fit import Fit
 from kinertia.findings.finding import finding
 from kinertia.findings.quantity import Quantity
-from kinertia.io.subject.provenance import command_line, recordings
+from kinertia.io.file_names import command_line
+from kinertia.io.subject.provenance import recordings
 from kinertia.io.subject.reader import read_subject
 from kinertia.io.subject.tables import InstrumentsFiles, PriorFiles, SubjectFile
 from kinertia.settings import Overrule

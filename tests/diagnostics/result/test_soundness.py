@@ -10,6 +10,7 @@ from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.soundness import attached_items, forces_of_the_motion, soundness, total_mass
 from kinertia.diagnostics.runner import explained
 from kinertia.estimation.prepared import TotalMass
+from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import MahalanobisDistance, OneSided
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.settings import Attached
@@ -19,6 +20,12 @@ from results import codes
 BODY = BodySegmentParameters(
     ("pelvis", "thigh_r"), [10.0, 8.0], [[0, 0, 0], [0, -0.2, 0]], [np.eye(3) * 0.1, np.diag([0.15, 0.04, 0.15])]
 )
+
+
+class Given(SimpleNamespace):
+    """Attributes of a fit, and what a fit derives from them."""
+
+    departures, expected_source = Fit.departures, Fit.expected_source
 
 
 def found(posterior=None, **changes):
@@ -35,7 +42,7 @@ def found(posterior=None, **changes):
         "more_known": False,
         "evaluations": 400,
     }
-    return list(soundness(ResultContext(SimpleNamespace(**{**given, **changes}), None)))
+    return list(soundness(ResultContext(Given(**{**given, **changes}), None)))
 
 
 def levels(answers):

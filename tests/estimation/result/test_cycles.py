@@ -7,8 +7,7 @@ import pytest
 
 from kinertia.estimation.result.cycles import LANDING_PEAKS, PEAKS, CycleCurve, peak_columns
 from kinertia.motion.gait_cycle import PERCENT, Stride
-from kinertia.report.figures.cycle_figures import drawn_curves
-from kinertia.report.pages.cycle_table import peak_rows
+from kinertia.report.pages.cycle_view import peak_rows
 
 STRIDE = Stride("r", 1, 0.0, 1.0, 0.6, 0.1, 0.5, True)
 FIRST, SECOND, IMPULSE = (peak.name for peak in PEAKS[:3])
@@ -79,7 +78,7 @@ def test_peaks_of_a_fit(fit, two_level):
     assert set(known[known.side == "l"].phase) == {"stance"}, "no heel strike follows the left stance on a plate"
     assert (known.value.between(0.0, 1.0) & (known.sd > 0.0)).all()
     assert two_level.peaks.empty
-    rows = {row.measure: row for row in peak_rows(drawn_curves(fit)["estimate"])}
+    rows = {row.measure: row for row in peak_rows(fit.curves["estimate"])}
     right = known[known.side == "r"]
     assert rows[f"{FIRST} (N m/kg)"].right.split(" ± ")[0] == f"{right.value.mean():.2f}"
     assert len(rows) == len(PEAKS)

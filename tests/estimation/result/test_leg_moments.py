@@ -6,25 +6,20 @@ import pytest
 
 from kinertia.diagnostics.result.suitability import suitability
 from kinertia.estimation.result.leg_moments import (
-    BESIDE,
-    HIDDEN,
-    PARTLY,
-    SHARED,
     coverage_by_task,
     coverage_sentence,
     forces_before,
     forces_used,
     full_bandwidth,
     gaps_sentence,
-    moment_coverage,
-    moment_gaps,
 )
+from kinertia.estimation.result.trial_fit import BESIDE, HIDDEN, PARTLY, SHARED
 from kinertia.settings import Settings
 
 
 def test_a_walk_over_plates_has_joint_moments_in_all_of_stance(fit):
     (trial,) = fit.trials
-    legs = moment_coverage(trial)
+    legs = trial.coverage
     assert [(leg.word, leg.missing) for leg in legs] == [("right", ()), ("left", ())]
     assert trial.kinematics.trial.task == "walk"
     assert list(coverage_by_task(fit.trials)) == ["walk"]
@@ -43,7 +38,7 @@ def test_only_known_moments_count(fit, side, foot):
     stance = np.flatnonzero(known & ground)
     late = k.trial.markers.time > curves.time[stance[3 * len(stance) // 4]]
     cut = replace(k, known=k.known & ~late[:, None], windows_s=((-2.0, -1.0),))
-    leg = moment_coverage(replace(trial, kinematics=cut))[foot]
+    leg = replace(trial, kinematics=cut).coverage[foot]
     assert leg.missing == ("push-off",)
     assert coverage_sentence([replace(trial, kinematics=cut)]).count("no push-off") >= 1
 
@@ -60,7 +55,7 @@ def test_without_strides_there_is_nothing(fit):
     (walk,) = fit.trials
     k = walk.kinematics
     unknown = replace(walk, kinematics=replace(k, trial=replace(k.trial, on_ground=None)))
-    assert moment_coverage(unknown) == ()
+    assert unknown.coverage == ()
     assert coverage_sentence([unknown]) == ""
 
 
@@ -98,14 +93,14 @@ def test_whatever_is_known_is_no_gap(fit):
     (trial,) = fit.trials
     known = trial.joint_curves.known.all(axis=1)
     time = trial.joint_curves.time
-    for gap in moment_gaps(trial):
+    for gap in trial.moment_gaps:
         assert not known[(time >= gap.start_s) & (time <= gap.end_s)].any()
         assert gap.reason == BESIDE
 
 
 def reasons(trial, span):
     middle = (span[0] + span[1]) / 2
-    return {gap.reason for gap in moment_gaps(trial) if gap.side == "l" and gap.start_s <= middle <= gap.end_s}
+    return {gap.reason for gap in trial.moment_gaps if gap.side == "l" and gap.start_s <= middle <= gap.end_s}
 
 
 def test_a_foot_that_is_partly_on_its_plate(interrupted):

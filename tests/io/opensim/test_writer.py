@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from generic_static import generic_model, random_coordinates
 from kinertia.io.opensim.reader import read_osim
-from kinertia.io.opensim.writer import export_osim, write_osim
+from kinertia.io.opensim.writer import edited_osim, export_osim
 from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.bsp import BodySegmentParameters
 from osim_comparison import RAJAGOPAL, SLOW_IF_LARGE, SMALL, SYNTHETIC, assert_opensim_agrees
@@ -53,6 +53,13 @@ def old_text(text: bytes, changes) -> bytes:
 
 
 @pytest.mark.parametrize("name", SLOW_IF_LARGE)
+def write_osim(path, *args, **options):
+    """Write the edited file, and return what changed."""
+    content, changes = edited_osim(*args, **options)
+    path.write_bytes(content)
+    return changes
+
+
 def test_only_mass_properties_change(opensim, file_of, tmp_path, name):
     source = file_of(name)
     ours = read_osim(source)

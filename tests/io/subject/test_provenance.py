@@ -5,7 +5,8 @@ from pathlib import PurePosixPath, PureWindowsPath
 
 import pytest
 
-from kinertia.io.subject.provenance import command_line, names_from_common_folder
+from kinertia.io.file_names import command_line
+from kinertia.io.subject.provenance import names_from_common_folder
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,8 @@ from kinertia.errors import FileError
 from kinertia.findings.finding import Severity
 from kinertia.io.output_folder import check_folder
 from kinertia.io.text.sto import read_sto
-from kinertia.report.exports.files import FIT_FILES, TRIAL_FILES, save_fit, summary
+from kinertia.report.exports.contents import summary
+from kinertia.report.exports.files import FIT_FILES, TRIAL_FILES, save_fit
 from kinertia.settings import Settings
 
 STAGES = {"literature", "corrected", "estimate"}

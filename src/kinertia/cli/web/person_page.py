@@ -20,7 +20,7 @@ from kinertia.cli.web.responses import page, time_left
 from kinertia.cli.web.rows import CONDITION, END, START, conditions, trial_fields
 from kinertia.cli.web.rows import rows as rows_of
 from kinertia.errors import KinertiaError
-from kinertia.estimation.result.mean_cycles import Control, band_columns
+from kinertia.estimation.result.mean_cycles import Control, band_columns, profiles_by_task
 from kinertia.io.norms_file import read_norms
 from kinertia.io.output_folder import write_then_rename
 from kinertia.model.marker_set import SEGMENTS
@@ -242,7 +242,8 @@ def letter(person: PersonFolder, library: Library) -> str:
     """Render the two pages for a patient's file, with the library's norms if it has any."""
     saved = read_saved(person.results)
     norms = read_norms(library.norms) if library.norms.is_file() else {}
-    return render(saved.fit, saved.provenance, saved.versions, norms, saved.truth, template="letter")
+    profiles = profiles_by_task(saved.fit, norms)
+    return render(saved.fit, saved.provenance, saved.versions, norms, profiles, saved.truth, template="letter")
 
 
 def people_compared(people: Sequence[PersonFolder], library: Library) -> str:

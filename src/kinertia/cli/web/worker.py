@@ -17,8 +17,9 @@ from kinertia.cli.compiling import compile_once
 from kinertia.cli.web.library import NORMS, OUTCOME, SUBJECT, SUMMARY, PersonFolder
 from kinertia.errors import KinertiaError
 from kinertia.findings.remedy import Span
+from kinertia.io.file_names import command_line
 from kinertia.io.output_folder import complete_folder
-from kinertia.io.subject.provenance import command_line, sha256
+from kinertia.io.subject.provenance import sha256
 from kinertia.io.subject.reader import read_subject
 from kinertia.io.subject.tables import SubjectFile
 
@@ -42,10 +43,11 @@ def check(person: PersonFolder, progress: Progress) -> None:
 
 def fit(person: PersonFolder, progress: Progress) -> None:
     """Run `kinertia fit` on the subject file: the results, and the subject file that they are of."""
+    from kinertia.diagnostics.result.suitability import suitability
     from kinertia.io.subject.provenance import provenance_of
     from kinertia.report.exports.files import save_fit
     from kinertia.report.pages.finding_view import digest
-    from kinertia.report.pages.headline import words
+    from kinertia.report.pages.headline import impossible, purposes
     from kinertia.workflow.from_files import fit_subject
 
     begun = time.time()
@@ -53,6 +55,7 @@ def fit(person: PersonFolder, progress: Progress) -> None:
     result = fit_subject(wanted, progress)
     progress("writing the results", 0.0)
     windows = windows_of(wanted, {trial.name: longest_first(trial.kinematics.windows_s) for trial in result.trials})
+    rated = purposes(suitability(result, result.findings, result.left_out), impossible(result))
     command = command_line(["kinertia", "fit", str(person.subject), "-o", str(person.results)])
     with complete_folder(person.results, "app") as work:
         save_fit(result, work, provenance_of(wanted, command), force=True)
@@ -64,7 +67,7 @@ def fit(person: PersonFolder, progress: Progress) -> None:
                 "inputs": person.inputs,
                 "summary": sha256(work / SUMMARY),
                 **digest(result.overview, windows),
-                "purposes": [purpose._asdict() for purpose in words(result).purposes],
+                "purposes": [purpose._asdict() for purpose in rated],
                 "ended": ended,
                 "seconds": round(ended - begun, 1),
             },

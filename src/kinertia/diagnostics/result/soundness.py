@@ -84,24 +84,11 @@ def _impossible(fit: Fit) -> Iterator[Finding]:
         yield finding("R202", None, None if estimated else Severity.INFO, segments=named[0], count=named[1])
 
 
-def expected_source(fit: Fit) -> str:
-    """Return the source of the expected values."""
-    if fit.more_known:
-        return "the prior"
-    return "the literature" if fit.file is None else "the model's own values"
-
-
-def away_from_expected(fit: Fit) -> np.ndarray:
-    """Return distances (s, 10) of parameters from their expected values, in prior SDs; zero where they were fixed."""
-    assert fit.posterior is not None
-    scale = np.where(fit.posterior.prior_sd > 0, fit.posterior.prior_sd, np.inf)
-    return (fit.estimate.table() - fit.expected.table()) / scale
-
-
 def _far_parameters(fit: Fit) -> Iterator[Finding]:
     """Report R203: every parameter beyond CONTRADICTION_SD; parameters of arms, whose shoulders lack an axis, do not
     count against the estimate."""
-    away = away_from_expected(fit)
+    away = fit.departures
+    assert away is not None
     beyond = np.abs(away) > CONTRADICTION_SD
     arms = np.array([str(segment_of(name)).startswith(_ARMS) for name in fit.estimate.segments])
     whole = (beyond.any(axis=1) & ~arms).sum() > MOST_DOUBTED_SEGMENTS
@@ -115,7 +102,7 @@ def _far_parameters(fit: Fit) -> Iterator[Finding]:
             distance_sd=Quantity(distance, "1", limit=CONTRADICTION_SD),
             distance=Quantity(f"{distance:+.1f} SD"),
             parameter=Quantity(PARAMETERS[column]),
-            source=Quantity(expected_source(fit)),
+            source=Quantity(fit.expected_source),
         )
 
 
@@ -137,7 +124,7 @@ def _far_centres(fit: Fit) -> Iterator[Finding]:
             distance_m=Quantity(float(moved_m[row]), "m", limit=CONTRADICTING_COM_M),
             distance=Quantity(f"{1e3 * moved_m[row]:.0f} mm"),
             parameter=Quantity("com"),
-            source=Quantity(expected_source(fit)),
+            source=Quantity(fit.expected_source),
         )
 
 

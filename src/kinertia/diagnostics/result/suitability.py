@@ -11,7 +11,6 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
-from kinertia.diagnostics.result.soundness import expected_source
 from kinertia.diagnostics.runner import check
 from kinertia.estimation.identifiability import INFORMED, MEASURED
 from kinertia.estimation.result.fit import Fit
@@ -117,24 +116,20 @@ def informed(fit: Fit, output: str) -> Informed | None:
 
 
 def _output(fit: Fit, name: str, findings: Sequence[Finding], left_out: Sequence[str]) -> Suitability:
-    causes = [(reported, _cause(reported, findings)) for reported in findings if _affects(reported, name)]
-    lowering = [(cause.code, level) for effect, cause in causes if (level := _level(effect, cause))]
-    levels, reasons = [level for _, level in lowering], []
-    if name in GROUPS:
-        level, reason = _of_parameters(fit, name)
-        levels.append(level)
-    else:
-        reason = _REASONS[name](fit)
-    reasons.append(reason if fit.converged else "the estimate did not converge")
+    level, reason = _of_parameters(fit, name) if name in GROUPS else (0, _REASONS[name](fit))
+    levels, reasons = [level], [reason if fit.converged else "the estimate did not converge"]
+    affecting = [reported for reported in findings if _affects(reported, name)]
+    lowering = [_lowering(reported, findings) for reported in affecting]
+    levels += [level for _, level in lowering]
     if not fit.converged:
         levels.append(2)
     if left_out:
         levels.append(1)
         reasons.append(f"{len(left_out)} of {len(fit.trials) + len(left_out)} trials left out")
-    codes = tuple(dict.fromkeys(code for code, _ in sorted(lowering, key=lambda lowering_code: -lowering_code[1])))
+    codes = tuple(dict.fromkeys(code for code, level in sorted(lowering, key=lambda cause: -cause[1]) if level))
     if codes:
         reasons.append(f"see {', '.join(codes)}")
-    return Suitability(_TITLES[name], _ORDER[max(levels, default=0)], "; ".join(reasons), codes)
+    return Suitability(_TITLES[name], _ORDER[max(levels)], "; ".join(reasons), codes)
 
 
 def _affects(reported: Finding, output: str) -> bool:
@@ -163,11 +158,12 @@ def _cause(reported: Finding, findings: Sequence[Finding]) -> Finding:
     return followed[-1]
 
 
-def _level(reported: Finding, cause: Finding) -> int:
-    """Return by how many steps of _ORDER a finding lowers an output, given the one that explains it."""
+def _lowering(reported: Finding, findings: Sequence[Finding]) -> tuple[str, int]:
+    """Return the code of the finding that explains this one, and by how many steps of _ORDER it lowers an output."""
+    cause = _cause(reported, findings)
     if cause.status == "ignored" or cause.severity < Severity.WARNING:
-        return 0
-    return 2 if reported.severity is Severity.ERROR and cause.status == "open" else 1
+        return cause.code, 0
+    return cause.code, 2 if reported.severity is Severity.ERROR and cause.status == "open" else 1
 
 
 def _concerns(reported: Finding, output: str) -> bool:
@@ -200,7 +196,7 @@ def _of_parameters(fit: Fit, name: str) -> tuple[int, str]:
 
 def prior_values(fit: Fit) -> str:
     """Name the source of parameters that the data do not inform: literature, prior or the model's own values."""
-    source = expected_source(fit)
+    source = fit.expected_source
     return source if source.endswith("values") else f"{source.removeprefix('the ')} values"
 
 

@@ -19,7 +19,6 @@ from kinertia.estimation.result.drawn_fit import drawn_bodies, drawn_joints, kep
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import PosteriorDraws
-from kinertia.model.skeleton import by_side
 from kinertia.motion.gait_cycle import PERCENT, Stride
 from kinertia.motion.joint_moments import component_names, joint_and_side
 from kinertia.motion.workload import pieces
@@ -242,7 +241,7 @@ def _later(stride: Stride, side: str, kind: str, edges: Sequence[float]) -> Stri
 def _columns(trial: Estimated, side: str) -> Iterator[tuple[str, bool, int]]:
     """Yield name and column of each angle, and of each component of joint moments, of a leg or of neither."""
     skeleton = trial.skeleton
-    for base, columns in by_side(skeleton.coordinates).items():
+    for base, columns in skeleton.sides.items():
         column = columns.get(side, columns.get(""))
         if column is not None and skeleton.rotational[column]:
             yield f"angle {base}", True, column

@@ -16,7 +16,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from kinertia.estimation.result.curve_source import CurveSource, Estimated, Stage, tracked
-from kinertia.model.skeleton import GRAVITY_M_S2, by_side
+from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.motion.gait_cycle import PERCENT, FeetUnderPelvis, Stride, feet_under_pelvis
 from kinertia.motion.joint_moments import component_names, joint_and_side
 from kinertia.motion.model_outputs import clinical_angles
@@ -34,6 +34,8 @@ UNITS: Mapping[Kind, str] = {
     "force": "% body weight",
     "clinical": "deg",
 }
+MOST_STRIDES = 100
+"""Largest number of strides of a trial and side in tables and figures; of more, this many are taken, evenly spread."""
 FORCES = ("ground_force_forward", "ground_force_upward", "ground_force_medial")
 _ROOT_COORDINATES = 6
 
@@ -62,6 +64,10 @@ class CycleCurve:
     value: np.ndarray
     sd: np.ndarray
     task: str = ""
+
+
+CurvesByStage = Mapping[Stage, Sequence[CycleCurve]]
+"""Curves of all trials, as estimated and conventional."""
 
 
 def cycle_curves(
@@ -108,7 +114,7 @@ class _TrackedStride(NamedTuple):
 
 def _curves(trial: Estimated, mass_kg: float, stage: Stage, strides: Sequence[_TrackedStride]) -> Iterator[CycleCurve]:
     source, skeleton, kinematics = CurveSource(trial, stage), trial.skeleton, trial.kinematics
-    sides = by_side(skeleton.coordinates)
+    sides = skeleton.sides
     for stride, path, angles in strides:
         time, curve = stride.time, partial(CycleCurve, trial.name, stride, task=kinematics.trial.task)
         angle, speed, moment = source.angle(time), source.speed(time), source.moment(time) / mass_kg
@@ -177,11 +183,9 @@ def _directions(path: np.ndarray, side: str) -> np.ndarray:
     return np.array([forward, [0.0, 1.0, 0.0], medial])
 
 
-def cycle_columns(
-    trials: Sequence[Estimated], mass_kg: float, stage: Stage = "estimate", most_strides: int | None = None
-) -> dict[str, Any]:
-    """Return the columns of `Fit.cycles`, by name, from at most so many strides per trial and side, evenly spread."""
-    return columns_of(curves_by_stage(trials, mass_kg, most_strides, [stage])[stage])
+def cycle_columns(trials: Sequence[Estimated], mass_kg: float, stage: Stage = "estimate") -> dict[str, Any]:
+    """Return the columns of `Fit.cycles`, by name."""
+    return columns_of(curves_by_stage(trials, mass_kg, None, [stage])[stage])
 
 
 def columns_of(curves: Sequence[CycleCurve]) -> dict[str, Any]:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 
@@ -14,6 +15,8 @@ from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.prepared import known
 from kinertia.estimation.result.curve_source import Stage
 from kinertia.estimation.result.cycles import (
+    MOST_STRIDES,
+    CurvesByStage,
     Kind,
     curves_by_stage,
     cycle_columns,
@@ -26,7 +29,7 @@ from kinertia.estimation.result.gait_scores import GaitProfile, with_norms
 from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.estimation.simultaneous.fit import Posterior
 from kinertia.estimation.simultaneous.instruments.instrument_errors import calibration_columns
-from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import asymmetries, asymmetry_columns
+from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import Asymmetry, asymmetries, asymmetry_columns
 from kinertia.findings.extensions import report_function
 from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.overview import Overview
@@ -108,6 +111,12 @@ class Fit:
 
         return pd.DataFrame(self.bsp_columns())
 
+    @cached_property
+    def evidence(self) -> np.ndarray:
+        """How well the data inform each parameter (s, 10), as in `bsp`; no rows after two-level."""
+        information = np.empty((0, 10)) if self.posterior is None else self.posterior.information
+        return np.array([[evidence(value) for value in row] for row in information], dtype=object).reshape(-1, 10)
+
     def bsp_columns(self) -> dict[str, Any]:
         """Return the columns of `bsp`, by name."""
         columns = self.literature.columns()
@@ -115,7 +124,21 @@ class Fit:
         if self.posterior is None:
             return columns
         of_posterior = {name: getattr(self.posterior, name).ravel() for name in ("prior_sd", "sd", "information")}
-        return {**columns, **of_posterior, "evidence": [evidence(value) for value in of_posterior["information"]]}
+        return {**columns, **of_posterior, "evidence": self.evidence.ravel().tolist()}
+
+    @cached_property
+    def curves(self) -> CurvesByStage:
+        """Curves by stage over strides, at most 100 per trial and side, and over `contact_phases`, computed once."""
+        return curves_by_stage(self.trials, self.mass_kg, MOST_STRIDES)
+
+    def with_trials(self, kept: Sequence[int]) -> Self:
+        """Return the fit with these of its trials alone, and their curves where they are known."""
+        part = replace(self, trials=tuple(self.trials[k] for k in kept))
+        if "curves" in vars(self):
+            names = {trial.name for trial in part.trials}
+            of_part = {stage: [one for one in curves if one.trial in names] for stage, curves in self.curves.items()}
+            vars(part)["curves"] = of_part
+        return part
 
     def cycles(self, stage: Stage = "estimate", norms: str | Path | None = None) -> pd.DataFrame:
         """Return curves over the gait cycle, one row per trial, side, stride, percent (0 to 100) and quantity.
@@ -205,6 +228,29 @@ class Fit:
     def more_known(self) -> bool:
         """Whether the prior's mean differs from the literature or the model."""
         return not np.array_equal(self.expected.table(), self.literature.table())
+
+    @property
+    def expected_source(self) -> str:
+        """Source of the expected parameters: "the prior", "the literature" or "the model's own values"."""
+        if self.more_known:
+            return "the prior"
+        return "the literature" if self.file is None else "the model's own values"
+
+    @cached_property
+    def estimated_rows(self) -> np.ndarray:
+        """Rows of the segments that were estimated; those with a prior SD of 0 stay as the model has them."""
+        if self.posterior is None:
+            return np.arange(len(self.estimate.segments))
+        return np.flatnonzero((self.posterior.prior_sd > 0).any(axis=1))
+
+    @cached_property
+    def departures(self) -> np.ndarray | None:
+        """Estimate minus the prior's mean (s, 10) in prior SDs, 0 where fixed; None after two-level."""
+        if self.posterior is None:
+            return None
+        scale = np.where(self.posterior.prior_sd > 0, self.posterior.prior_sd, np.inf)
+        result: np.ndarray = (self.estimate.table() - self.expected.table()) / scale
+        return result
 
     @property
     def mass_kg(self) -> float:
@@ -307,6 +353,11 @@ class Fit:
         names = (self.bsp["segment"] + "." + self.bsp["parameter"]).tolist()
         return pd.DataFrame(self.posterior.covariance, index=names, columns=names)
 
+    @cached_property
+    def asymmetries(self) -> tuple[Asymmetry, ...]:
+        """Differences between the sides, a pair of segments each; none after two-level."""
+        return () if self.posterior is None else tuple(asymmetries(self.estimate, self.posterior.covariance))
+
     @property
     def asymmetry(self) -> pd.DataFrame | None:
         """Right minus left of every pair of segments, with its SD and whether it differs; None after two-level.
@@ -318,7 +369,7 @@ class Fit:
             return None
         import pandas as pd
 
-        return pd.DataFrame(asymmetry_columns(asymmetries(self.estimate, self.posterior.covariance)))
+        return pd.DataFrame(asymmetry_columns(self.asymmetries))
 
     @property
     def calibration(self) -> pd.DataFrame | None:

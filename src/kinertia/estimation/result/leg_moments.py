@@ -1,70 +1,37 @@
-"""Finds in which parts of stances and strides joint moments are known, and which ground reactions they rest on."""
+"""Describes in which parts of stances and strides joint moments are known, and which ground reactions they rest on."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from kinertia.estimation.result.curve_source import Estimated
 from kinertia.estimation.result.drawn_curves import drawn_forces
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.trial_fit import JointCurves, TrialFit
 from kinertia.motion.ground_reactions import GroundReactions
-from kinertia.motion.kinematics import AROUND_CONTACT_S, near_contacts
 from kinertia.motion.model_outputs import Convention, Departures, ModelOutput, model_outputs
 from kinertia.settings import Settings
-from kinertia.trial.data import FEET, LOAD_THRESHOLD_N
+from kinertia.trial.data import FEET
 from kinertia.trial.plate_assignment import FOOT_NAMES
-from kinertia.trial.sampled_data import nearest_samples, runs, span_s
-from kinertia.trial.stances import LegCoverage, joined_coverage, leg_coverage
+from kinertia.trial.stances import LegCoverage, joined_coverage
 
-HIDDEN = "markers do not show the leg"
-OUTSIDE = "no forces were recorded"
-SHARED = "one plate carries both feet"
-PARTLY = "the foot reaches beyond its plate, or something else loads the plate"
-BESIDE = "the foot stands beside the plates"
-FAR = f"more than {AROUND_CONTACT_S} s from any contact with a plate"
-ENDS = "too near the ends of the recording for accelerations, or left out"
-_SHORTEST_S = 0.03
-"""Shorter gaps are not listed."""
 NOTABLE_IMPACT_N = 0.5
 """RMS below which impact transients are not mentioned."""
 _MOST_DRAWS = 100
 """A correlation is known to 0.1 or better from so many."""
 
 
-def moment_coverage(trial: Estimated) -> tuple[LegCoverage, ...]:
-    """Return the part of stance and stride of the right and the left leg in which all its joint moments are known.
-
-    Empty where the trial has no strides, or it is unknown when the feet are on the ground.
-    """
-    if not trial.strides:
-        return ()
-    return leg_coverage(trial.kinematics.trial, known_legs(trial))
-
-
-def known_legs(trial: Estimated) -> np.ndarray:
-    """Return the mask (n, 2) of marker frames in which all joint moments of the right, left leg are known."""
-    k, skeleton = trial.kinematics, trial.skeleton
-    known = np.repeat((k.inside(k.trial.markers.time) & k.complete)[:, None], 2, axis=1)
-    if k.known is not None and trial.joint_curves is not None:
-        for foot, segment in enumerate(skeleton.feet):
-            axes = np.unique(skeleton.map.owner[skeleton.support[skeleton.segments.index(segment)]])
-            known[:, foot] |= k.known[:, axes[axes >= len(skeleton.joints[0].axes)]].all(axis=1)
-    return known
-
-
-def coverage_by_task(trials: Sequence[Estimated]) -> Mapping[str, tuple[LegCoverage, ...]]:
+def coverage_by_task(trials: Sequence[TrialFit]) -> Mapping[str, tuple[LegCoverage, ...]]:
     """Return what is known of each leg in any of the trials of a task, by task."""
     by_task: dict[str, list[tuple[LegCoverage, ...]]] = {}
     for trial in trials:
-        if legs := moment_coverage(trial):
+        if legs := trial.coverage:
             by_task.setdefault(trial.kinematics.trial.task, []).append(legs)
     return {task: joined_coverage(legs) for task, legs in by_task.items()}
 
 
-def coverage_sentence(trials: Sequence[Estimated]) -> str:
+def coverage_sentence(trials: Sequence[TrialFit]) -> str:
     """Describe what is known: "right: whole stride; left: 0 to 48 % of the stride, no push-off"; empty without strides.
 
     With several tasks: "walk (right: ...; left: ...); turn (...)".
@@ -74,60 +41,20 @@ def coverage_sentence(trials: Sequence[Estimated]) -> str:
     return "; ".join(f"{task} ({text})" if len(texts) > 1 and task else text for task, text in texts.items())
 
 
-@dataclass(frozen=True)
-class MomentGap:
-    """Time (s) in which the moments of a leg ("r" or "l") are not known, with the reason."""
-
-    side: str
-    start_s: float
-    end_s: float
-    reason: str
-
-
-def moment_gaps(trial: Estimated) -> tuple[MomentGap, ...]:
-    """Return the gaps of the right, then the left leg between the first and the last frame that has any moment."""
-    return tuple(_gaps(trial)) if trial.joint_curves is not None else ()
-
-
-def gaps_sentence(trials: Sequence[Estimated]) -> str:
+def gaps_sentence(trials: Sequence[TrialFit]) -> str:
     """List the gaps by reason: "the foot stands beside the plates (right 1.20 to 1.40 s)"; with several trials by
     trial.
     """
     parts = []
     for trial in trials:
         spans: dict[str, list[str]] = {}
-        for gap in moment_gaps(trial):
+        for gap in trial.moment_gaps:
             side = FOOT_NAMES[FEET.index(gap.side)]
             spans.setdefault(gap.reason, []).append(f"{side} {gap.start_s:.2f} to {gap.end_s:.2f} s")
         gaps = "; ".join(f"{reason} ({', '.join(texts)})" for reason, texts in spans.items())
         if gaps:
             parts.append(f"{trial.name}: {gaps}" if len(trials) > 1 else gaps)
     return ". ".join(parts)
-
-
-def _gaps(trial: Estimated) -> Iterator[MomentGap]:
-    k = trial.kinematics
-    time, loads, frames = k.trial.markers.time, k.trial.loads, k.trajectory_frames
-    nearest = nearest_samples(loads.time, time)
-    loaded = loads.force[nearest, :, 1] >= LOAD_THRESHOLD_N
-    shared = np.zeros(len(time), dtype=bool) if loads.on_shared_plate is None else loads.on_shared_plate[nearest]
-    known, measured = known_legs(trial), k.trial.known_legs
-    for foot, (side, segment) in enumerate(zip(FEET, trial.skeleton.feet, strict=True)):
-        moved = np.unique(trial.skeleton.map.owner[trial.skeleton.support[trial.skeleton.segments.index(segment)]])
-        reasons = {
-            HIDDEN: ~np.isfinite(k.ik.q[:, moved]).all(axis=1),
-            OUTSIDE: (time < loads.time[0]) | (time > loads.time[-1]),
-            SHARED: ~measured[:, foot] & shared,
-            PARTLY: ~measured[:, foot] & loaded[:, foot],
-            BESIDE: ~measured[:, foot],
-            FAR: ~near_contacts(k.trial),
-        }
-        which = np.select([known[:, foot], *reasons.values()], [-1, *range(len(reasons))], len(reasons))[frames]
-        names = [*reasons, ENDS]
-        for number, name in enumerate(names):
-            for first, last in runs(which == number):
-                if span_s(time[frames], first, last) >= _SHORTEST_S:
-                    yield MomentGap(side, float(time[frames][first]), float(time[frames][last]), name)
 
 
 class ForcesUsed(NamedTuple):

@@ -14,7 +14,7 @@ Angles are clinical angles, as in the paper, from inverse kinematics.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -25,7 +25,7 @@ from kinertia.estimation.result.cycles import cycle_curves, spatiotemporal_colum
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.gait_scores import GaitProfile, rms_deg, variable_score
 from kinertia.io.norms_file import Norm
-from kinertia.model.skeleton import by_side, opposite_on_left
+from kinertia.model.skeleton import opposite_on_left
 from kinertia.motion.gait_cycle import PERCENT
 from kinertia.motion.model_outputs import CLINICAL_ANGLES
 from kinertia.trial.data import FEET
@@ -51,7 +51,7 @@ def convention_of(fit: Fit) -> str:
     """Describe the model that a fit's curves belong to; even clinical angles differ by degrees between models."""
     if fit.file is None:
         return f"Kinertia {_BUILT_IN}"
-    return "OpenSim model with " + " ".join(sorted(by_side(fit.skeleton.coordinates)))
+    return "OpenSim model with " + " ".join(sorted(fit.skeleton.sides))
 
 
 def mean_curves(fit: Fit) -> MeanCurves:
@@ -112,7 +112,7 @@ def fits_by_task(fit: Fit) -> dict[str, Fit]:
             trials.setdefault(trial.kinematics.trial.task, []).append(k)
     strides = {task: sum(len(fit.trials[k].strides) for k in members) for task, members in trials.items()}
     order = sorted(trials, key=lambda task: (task != "walk", -strides[task]))
-    return {task: replace(fit, trials=tuple(fit.trials[k] for k in trials[task])) for task in order}
+    return {task: fit.with_trials(trials[task]) for task in order}
 
 
 def main_task(fit: Fit) -> Fit:
@@ -139,6 +139,20 @@ def gait_profile(fit: Fit, norms: Mapping[str, Norm]) -> GaitProfile:
         legs = "legs are not hip, knee and ankle with axes forward, up and right"
         raise KinertiaError(f"there are no clinical angles for the model {fit.skeleton.name}: its {legs}")
     return scores(curves, norms, remarks(fit, norms[_PELVIS[0]]))
+
+
+def profiles_by_task(fit: Fit, norms: Mapping[str, Norm]) -> dict[str, GaitProfile]:
+    """Compute the scores by task, in the order of `fits_by_task`; none where norms lack a variable.
+
+    Those of the main task are the fit's own.
+
+    Raises:
+        KinertiaError: as `gait_profile`.
+    """
+    if not set(CLINICAL_ANGLES) <= set(norms):
+        return {}
+    fits = enumerate(fits_by_task(fit).items())
+    return {task: gait_profile(part if k else fit, norms) for k, (task, part) in fits}
 
 
 def expect_all_nine(norms: Mapping[str, Norm]) -> None:

@@ -6,7 +6,7 @@ the other leg does. What is not known is NaN, never zero.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Self, TypeAlias
@@ -22,7 +22,10 @@ from kinertia.motion.dynamics import Motion, inverse_dynamics
 from kinertia.motion.gait_cycle import Stride, contact_phases, strides_of
 from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.joint_moments import BodyJoint, JointMoments, body_joints, joint_moments
-from kinertia.motion.kinematics import Kinematics
+from kinertia.motion.kinematics import AROUND_CONTACT_S, Kinematics, near_contacts
+from kinertia.trial.data import FEET, LOAD_THRESHOLD_N
+from kinertia.trial.sampled_data import nearest_samples, runs, span_s
+from kinertia.trial.stances import LegCoverage, leg_coverage
 from kinertia.trial.trial_input import WITHOUT_STRIDES
 
 if TYPE_CHECKING:
@@ -31,6 +34,27 @@ if TYPE_CHECKING:
 
 Stage: TypeAlias = tuple[Skeleton, BodySegmentParameters, Motion, GroundReactions]
 """What joint loads are computed from: motion at the frames of `Kinematics.trajectory_time`."""
+
+
+HIDDEN = "markers do not show the leg"
+OUTSIDE = "no forces were recorded"
+SHARED = "one plate carries both feet"
+PARTLY = "the foot reaches beyond its plate, or something else loads the plate"
+BESIDE = "the foot stands beside the plates"
+FAR = f"more than {AROUND_CONTACT_S} s from any contact with a plate"
+ENDS = "too near the ends of the recording for accelerations, or left out"
+_SHORTEST_S = 0.03
+"""Shorter gaps are not listed."""
+
+
+@dataclass(frozen=True)
+class MomentGap:
+    """Time (s) in which the moments of a leg ("r" or "l") are not known, with the reason."""
+
+    side: str
+    start_s: float
+    end_s: float
+    reason: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,6 +229,12 @@ class TrialFit:
         """Estimated coordinates (rad, m) over time."""
         return by_coordinate(self.kinematics, self.motion.q)
 
+    @property
+    def motion_change(self) -> np.ndarray:
+        """Estimated coordinates minus those of inverse kinematics (w, c), rad and m; NaN where markers show none."""
+        result: np.ndarray = self.motion.q - self.kinematics.ik.q[self.kinematics.frames]
+        return result
+
     @cached_property
     def coordinate_sd(self) -> pd.DataFrame | None:
         """Posterior standard deviations of `coordinates`, in the same form; None after two-level."""
@@ -220,6 +250,30 @@ class TrialFit:
     def phases(self) -> tuple[Stride, ...]:
         """Phases of contacts with plates that are part of no stride: "stance", or "landing"; none in squats."""
         return contact_phases(self.skeleton, self.kinematics, self.strides)
+
+    @cached_property
+    def known_legs(self) -> np.ndarray:
+        """Mask (n, 2) of marker frames in which all joint moments of the right, left leg are known."""
+        k, skeleton = self.kinematics, self.skeleton
+        known = np.repeat((k.inside(k.trial.markers.time) & k.complete)[:, None], 2, axis=1)
+        if k.known is not None and self.joint_curves is not None:
+            for foot, segment in enumerate(skeleton.feet):
+                axes = np.unique(skeleton.map.owner[skeleton.support[skeleton.segments.index(segment)]])
+                known[:, foot] |= k.known[:, axes[axes >= len(skeleton.joints[0].axes)]].all(axis=1)
+        return known
+
+    @cached_property
+    def coverage(self) -> tuple[LegCoverage, ...]:
+        """Part of stance and stride of the right and the left leg in which all its joint moments are known.
+
+        Empty where the trial has no strides, or it is unknown when the feet are on the ground.
+        """
+        return leg_coverage(self.kinematics.trial, self.known_legs) if self.strides else ()
+
+    @cached_property
+    def moment_gaps(self) -> tuple[MomentGap, ...]:
+        """Gaps of the right, then the left leg's moments between the first and the last frame that has any moment."""
+        return () if self.joint_curves is None else tuple(_gaps(self.skeleton, self.kinematics, self.known_legs))
 
     @cached_property
     def moments(self) -> Mapping[str, pd.DataFrame]:
@@ -240,6 +294,31 @@ class TrialFit:
         """Return the HTML summary for a notebook: frames used, marker distances, residuals."""
         html: str = report_function("trial_fit_html")(self)
         return html
+
+
+def _gaps(skeleton: Skeleton, k: Kinematics, known: np.ndarray) -> Iterator[MomentGap]:
+    """Yield the gaps of each leg, given the frames (n, 2) in which its moments are known."""
+    time, loads, frames = k.trial.markers.time, k.trial.loads, k.trajectory_frames
+    nearest = nearest_samples(loads.time, time)
+    loaded = loads.force[nearest, :, 1] >= LOAD_THRESHOLD_N
+    shared = np.zeros(len(time), dtype=bool) if loads.on_shared_plate is None else loads.on_shared_plate[nearest]
+    measured = k.trial.known_legs
+    for foot, (side, segment) in enumerate(zip(FEET, skeleton.feet, strict=True)):
+        moved = np.unique(skeleton.map.owner[skeleton.support[skeleton.segments.index(segment)]])
+        reasons = {
+            HIDDEN: ~np.isfinite(k.ik.q[:, moved]).all(axis=1),
+            OUTSIDE: (time < loads.time[0]) | (time > loads.time[-1]),
+            SHARED: ~measured[:, foot] & shared,
+            PARTLY: ~measured[:, foot] & loaded[:, foot],
+            BESIDE: ~measured[:, foot],
+            FAR: ~near_contacts(k.trial),
+        }
+        which = np.select([known[:, foot], *reasons.values()], [-1, *range(len(reasons))], len(reasons))[frames]
+        names = [*reasons, ENDS]
+        for number, name in enumerate(names):
+            for first, last in runs(which == number):
+                if span_s(time[frames], first, last) >= _SHORTEST_S:
+                    yield MomentGap(side, float(time[frames][first]), float(time[frames][last]), name)
 
 
 def by_coordinate(kinematics: Kinematics, values: np.ndarray) -> pd.DataFrame:

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.errors import FileError
+from kinertia.errors import FileError, expect_file
 from kinertia.findings.display import first_few
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity, Where
@@ -33,7 +33,7 @@ from kinertia.io.c3d.plates import PLATE_TYPES, lab_plates, person_on_plates
 from kinertia.io.c3d.structure import doubts_about, with_plain_samples
 from kinertia.io.c3d.theia import POSE_SD_M, Poses, virtual_markers, virtual_places
 from kinertia.io.lab_plates import plate_left_out, to_ground, to_ground_plates
-from kinertia.io.text.number_table import expect_file, left_out, most_seen, people_among, without_prefixes
+from kinertia.io.text.number_table import left_out, most_seen, people_among, without_prefixes
 from kinertia.io.text.trc import METRES_PER_UNIT, read_as_missing, stand_ins, unknown_unit
 from kinertia.trial.data import FloatArray, Markers, Recording
 from kinertia.trial.file_contents import FileOutputs

@@ -12,9 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from kinertia.errors import FileError
+from kinertia.errors import FileError, mismatch, wrong_kind
 from kinertia.findings.quantity import Quantity
-from kinertia.io.text.number_table import mismatch, wrong_kind
 
 _BLOCK = 512
 _MIPS = 86

@@ -10,12 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from kinertia.errors import OsimError
+from kinertia.errors import OsimError, expect_file
 from kinertia.findings.finding import with_evidence
 from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.opensim.joints import Frames, JointElement, Values, coupled, read_joint, read_joint_in_body
 from kinertia.io.opensim.xml import Element, XmlError, parse
-from kinertia.io.text.number_table import expect_file
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.coordinate_range import Range
 from kinertia.model.imported_model import Coupling, OsimJoint, OsimModel

@@ -36,14 +36,19 @@ CHANGE_COLUMNS = ("component", "property", "old", "new")
 
 
 def export_osim(path: str | Path, skeleton: Skeleton, bsp: BodySegmentParameters) -> None:
-    """Write the skeleton with these body segment parameters; segments that it does not have are massless.
+    """Write the file of `osim_text`; it appears complete or not at all."""
+    write_then_rename(Path(path), osim_text(skeleton, bsp))
+
+
+def osim_text(skeleton: Skeleton, bsp: BodySegmentParameters) -> str:
+    """Return the file of the skeleton with these body segment parameters; segments without any are massless.
 
     Raises:
         ValueError: an axis follows its coordinate by a function, or rotates before another translates.
     """
     rows = dict(zip(bsp.segments, bsp.table(), strict=True))
     bodies = [body_text(segment, rows.get(segment, np.zeros(10))) for segment in skeleton.segments]
-    text = "\n".join(
+    return "\n".join(
         [
             '<?xml version="1.0" encoding="UTF-8" ?>',
             f'<OpenSimDocument Version="{_FORMAT}">',
@@ -59,7 +64,6 @@ def export_osim(path: str | Path, skeleton: Skeleton, bsp: BodySegmentParameters
             "",
         ]
     )
-    write_then_rename(Path(path), text)
 
 
 def _set(tag: str, objects: Sequence[str]) -> list[str]:
@@ -190,18 +194,16 @@ class _Edit:
     values: np.ndarray
 
 
-def write_osim(
-    path: str | Path,
+def edited_osim(
     model: OsimModel,
     bsp: BodySegmentParameters,
     markers: Mapping[str, np.ndarray] | None = None,
     joint_shifts: Mapping[str, np.ndarray] | None = None,
     welds: Mapping[str, str] | None = None,
-) -> pd.DataFrame:
-    """Write the model's file with these parameters, and return what changed.
+) -> tuple[bytes, pd.DataFrame]:
+    """Return the model's file with these parameters, and what changed.
 
     Args:
-        path: path of the new file.
         model: the model as read.
         bsp: parameters of some or all of its bodies.
         markers: positions by label, (3,) m in the marker's body.
@@ -209,7 +211,8 @@ def write_osim(
         welds: by segment of `bsp` that the model lacks, the body that it is welded to.
 
     Returns:
-        one row per changed property: component, property, old and new text; no rows if nothing changed.
+        the file's content, and one row per changed property: component, property, old and new text; no rows if nothing
+        changed.
     """
     top = parse(model.content)
     document = top.child("Model")
@@ -229,10 +232,9 @@ def write_osim(
         row = bsp.table()[bsp.segments.index(child)]
         spans += _welded(top, document, parent, child, row)
         rows.append((child, "body", "", f"welded to {parent}, {float(row[0])!r} kg"))
-    Path(path).write_bytes(replaced(model.content, spans))
     import pandas as pd
 
-    return pd.DataFrame(rows, columns=list(CHANGE_COLUMNS))
+    return replaced(model.content, spans), pd.DataFrame(rows, columns=list(CHANGE_COLUMNS))
 
 
 def _replacement(element: Element, tag: str, old: Element | None, new: str) -> tuple[tuple[int, int], bytes]:

@@ -9,9 +9,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from kinertia.errors import FileError, KinertiaError, MarkerSetError
+from kinertia.errors import FileError, KinertiaError, MarkerSetError, missing_file
 from kinertia.findings.quantity import Quantity
-from kinertia.io.file_names import RESULT_FILES, missing_file
+from kinertia.io.file_names import RESULT_FILES
 from kinertia.io.marker_set_draft import MarkerSetDraft, draft_marker_set, preset_of
 from kinertia.io.marker_set_file import marker_set_of, preset_name
 from kinertia.io.recording import ADDED_FILES, CORTEX, MARKER_FILES, read_recording

@@ -1,9 +1,7 @@
 """Records where a result comes from: command, files with their hashes, versions; finds these files again."""
 
 import hashlib
-import os
 import shlex
-import subprocess
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath, PurePosixPath
@@ -56,12 +54,6 @@ def names_from_common_folder(paths: Sequence[PurePath]) -> list[str]:
     """Return each path relative to their common folder; whole paths where there is none, as on two Windows drives."""
     above = next((folder for folder in paths[0].parents if all(path.is_relative_to(folder) for path in paths)), None)
     return [(path if above is None else path.relative_to(above)).as_posix() for path in paths]
-
-
-def command_line(words: Sequence[str], windows: bool = os.name == "nt") -> str:
-    """Join words to one line that a shell splits into these again: cmd and PowerShell do not support POSIX single
-    quotes."""
-    return subprocess.list2cmdline(words) if windows else shlex.join(words)
 
 
 def sha256(path: Path) -> str:

@@ -55,10 +55,9 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from kinertia.errors import FileError, SettingsError, SubjectError, wrong_entry
-from kinertia.findings.finding import Finding, finding
-from kinertia.findings.quantity import Quantity
-from kinertia.io.file_names import trouble_as_folders
-from kinertia.io.subject.provenance import command_line
+from kinertia.findings.finding import Finding, finding, with_evidence
+from kinertia.findings.quantity import Quantity, Where
+from kinertia.io.file_names import command_line, trouble_as_folders
 from kinertia.io.subject.tables import TABLES, CodedError, StudyFile, SubjectFile, shown
 from kinertia.io.text.number_table import number_of
 from kinertia.io.text.toml_lines import Location, TomlFile, read_toml
@@ -97,7 +96,7 @@ def read_subject(path: str | Path, to_fit: bool = True) -> SubjectFile:
     """Read and check a subject file, with the overrules of the study file above it.
 
     Args:
-        path: the file.
+        path: the file, or a folder with one (`subject_file_in`).
         to_fit: require what only a fit needs: the sex, for the anthropometric tables.
 
     Raises:
@@ -106,6 +105,8 @@ def read_subject(path: str | Path, to_fit: bool = True) -> SubjectFile:
             mass); with the line.
     """
     path = Path(path).resolve()
+    if path.is_dir():
+        path = subject_file_in(path)
     document = read_toml(path, "a subject file (subject.toml)")
     if "landmarks" in document.content:
         expected = "expected the subject file that names it (markers = ... under [model])"
@@ -127,7 +128,7 @@ def read_subject(path: str | Path, to_fit: bool = True) -> SubjectFile:
     if trouble := trouble_as_folders([trial.name for trial in result.trials]):
         index, problem = trouble
         words = {"name": Quantity(shown(result.trials[index].name)), "problem": Quantity(problem)}
-        raise FileError.found(path, "F192", document.line(("trial", index, "name")), **words)
+        raise FileError.of(path, with_evidence("F192", Where(), words), document.line(("trial", index, "name")))
     return result.model_copy(update={"diagnostics": _of_study(path.parent) + result.diagnostics})
 
 

@@ -10,9 +10,10 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
+from kinertia.errors import missing_file
 from kinertia.findings.finding import Severity, with_evidence
 from kinertia.findings.quantity import Quantity, Where
-from kinertia.io.file_names import missing_file, path_from
+from kinertia.io.file_names import path_from
 from kinertia.io.marker_set_file import preset_names
 from kinertia.io.text.toml_lines import quoted
 from kinertia.settings import (

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from kinertia.errors import FileError
+from kinertia.errors import FileError, mismatch
 from kinertia.findings.finding import Finding, with_evidence
 from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.lab_plates import LabPlates, to_ground_plates
-from kinertia.io.text.number_table import mismatch, read_lines, read_rows, uneven
+from kinertia.io.text.number_table import read_lines, read_rows, uneven
 from kinertia.io.text.sto import header_entry, other_count
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
 

@@ -13,9 +13,9 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-from kinertia.errors import FileError
+from kinertia.errors import FileError, expect_file, malformed, mismatch
 from kinertia.findings.quantity import Quantity
-from kinertia.io.text.number_table import expect_file, malformed, mismatch, wrong_cells
+from kinertia.io.text.number_table import wrong_cells
 from kinertia.io.text.sto import expect_once
 
 _SEPARATORS = ",;\t"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import codecs
 import contextlib
 import math
-import os
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -13,10 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from kinertia.errors import FileError
+from kinertia.errors import FileError, expect_file, malformed, mismatch
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Quantity, Where
-from kinertia.io.file_names import missing_file
 from kinertia.trial.data import BoolArray, FloatArray
 from kinertia.trial.sampled_data import step_evidence
 
@@ -54,36 +52,6 @@ def read_lines(path: Path) -> list[str]:
         raise mismatch(path, kind, "bytes of a binary file", "text")
     text = content.decode("utf-8-sig", errors="replace")
     return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-
-
-def expect_file(path: Path, expected: str = "a file") -> None:
-    """Raise a FileError that states the folder and the nearest names in it, unless `path` is a file."""
-    if os.path.isfile(path):
-        return
-    if os.path.isdir(path):
-        raise wrong_kind(path, "A folder", "be read here", expected)
-    raise FileError.found(path, "F101", **missing_file(path, str(path), expected))
-
-
-def expect_path(path: Path) -> None:
-    """Raise a FileError unless a file or folder has this path."""
-    if not os.path.exists(path):
-        raise FileError.found(path, "F101", **missing_file(path, str(path), "a recording, a subject file or a folder"))
-
-
-def wrong_kind(path: Path, given: str, what: str, expected: str) -> FileError:
-    """Return the error that `given` "cannot {what}; expected {expected}"."""
-    return FileError.found(path, "F102", given=Quantity(given), what=Quantity(what), expected=Quantity(expected))
-
-
-def mismatch(path: Path, kind: str, found: str, expected: str, line: int | None = None) -> FileError:
-    """Return the error that the content "is not {kind}: found {found}, expected {expected}"."""
-    return FileError.found(path, "F103", line, found=Quantity(found), kind=Quantity(kind), expected=Quantity(expected))
-
-
-def malformed(path: Path, line: int | None, found: str, expected: str, **known: Quantity) -> FileError:
-    """Return the error of a cell or row: "found {found}; expected {expected}"; `cell` and `column` for one cell."""
-    return FileError.found(path, "F105", line, **known, found=Quantity(found), expected=Quantity(expected))
 
 
 def read_rows(

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kinertia.errors import FileError
+from kinertia.errors import FileError, mismatch
 from kinertia.findings.finding import Finding
 from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.lab_plates import (
@@ -24,7 +24,7 @@ from kinertia.io.lab_plates import (
     to_ground,
     to_ground_plates,
 )
-from kinertia.io.text.number_table import mismatch, most_seen, read_lines, read_rows
+from kinertia.io.text.number_table import most_seen, read_lines, read_rows
 from kinertia.io.text.sto import header_entry, other_count
 from kinertia.io.text.trc import seen_positions
 from kinertia.trial.data import FloatArray, Markers, Recording

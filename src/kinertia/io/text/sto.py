@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kinertia.errors import FileError
+from kinertia.errors import FileError, malformed, mismatch
 from kinertia.findings.finding import Finding, with_evidence
 from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.output_folder import write_then_rename
-from kinertia.io.text.number_table import malformed, mismatch, read_lines, read_rows
+from kinertia.io.text.number_table import read_lines, read_rows
 from kinertia.trial.data import FloatArray
 
 if TYPE_CHECKING:

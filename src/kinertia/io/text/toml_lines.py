@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from kinertia.io.text.number_table import expect_file, mismatch
+from kinertia.errors import expect_file, mismatch
 
 Location = tuple[str | int, ...]
 """Place of a table or key from the top: ("trial", 1, "markers")."""
@@ -42,14 +42,14 @@ def read_toml(path: Path, expected: str) -> TomlFile:
     Raises:
         FileError: no such file, not UTF-8, not TOML; with the line.
     """
-    expect_file(path, expected)
-    raw = path.read_bytes()
     try:
-        text = raw.decode("utf-8-sig")
+        return parse_toml(path.read_bytes().decode("utf-8-sig"), path)
     except UnicodeDecodeError as error:
-        line = raw[: error.start].count(b"\n") + 1
+        line = error.object[: error.start].count(b"\n") + 1
         raise mismatch(path, expected, "text that is not UTF-8", "the UTF-8 encoding", line) from error
-    return parse_toml(text, path)
+    except OSError:
+        expect_file(path, expected)
+        raise
 
 
 def parse_toml(text: str, path: Path) -> TomlFile:

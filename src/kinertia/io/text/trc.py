@@ -8,13 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from kinertia.errors import FileError
+from kinertia.errors import FileError, malformed, mismatch
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.text.number_table import (
-    malformed,
-    mismatch,
     most_seen,
     read_lines,
     read_rows,

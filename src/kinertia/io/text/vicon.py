@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kinertia.errors import FileError
+from kinertia.errors import FileError, malformed, mismatch
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.lab_plates import (
@@ -26,7 +26,7 @@ from kinertia.io.lab_plates import (
     to_ground,
     to_ground_plates,
 )
-from kinertia.io.text.number_table import malformed, mismatch, read_lines, uneven, without_prefixes, wrong_cells
+from kinertia.io.text.number_table import read_lines, uneven, without_prefixes, wrong_cells
 from kinertia.io.text.sto import header_entry
 from kinertia.io.text.trc import METRES_PER_UNIT, seen_positions, unknown_unit
 from kinertia.trial.data import FloatArray, Markers, Recording

@@ -18,7 +18,7 @@ from kinertia.report.figures.coordinate_titles import load_title, panels_of, sam
 from kinertia.report.figures.cycle_figures import estimated_curves, mean_curve, mean_line
 from kinertia.report.figures.figure import COMPARED, SIDES, Figure, Panel, plain, small_multiples, written
 from kinertia.report.figures.time_figures import MOST_FRAMES
-from kinertia.report.pages.cycle_table import stride_rows
+from kinertia.report.pages.cycle_view import stride_rows
 from kinertia.report.pages.file_outputs import outputs_summary, outputs_view
 from kinertia.report.pages.rendering import rendered
 from kinertia.report.wording import INTERVAL_SD, decimals, fixed, read_in

@@ -11,10 +11,9 @@ from typing import Any, Literal
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.simultaneous.fit import Posterior
-from kinertia.report.figures.bsp_figures import estimated_rows, segment_name
+from kinertia.report.figures.bsp_figures import segment_name
 from kinertia.report.figures.figure import (
     BLACK,
     BLUE,
@@ -269,7 +268,7 @@ class _Colours:
 def _by_mass(fit: Fit) -> _Colours:
     before, after = fit.literature.mass_kg, fit.estimate.mass_kg
     percent = np.full(len(before), np.nan)
-    rows = estimated_rows(fit)
+    rows = fit.estimated_rows
     percent[rows] = 100 * (after[rows] / before[rows] - 1)
     sd = None if fit.posterior is None else fit.posterior.sd[:, 0]
     texts = []
@@ -290,8 +289,8 @@ def _by_mass(fit: Fit) -> _Colours:
 
 def _by_information(fit: Fit, posterior: Posterior) -> _Colours:
     percent = 100 * np.clip(posterior.information[:, 0], 0.0, 1.0)
-    percent[np.setdiff1d(np.arange(len(percent)), estimated_rows(fit))] = np.nan
-    words = [evidence(value) for value in posterior.information[:, 0]]
+    percent[np.setdiff1d(np.arange(len(percent)), fit.estimated_rows)] = np.nan
+    words = fit.evidence[:, 0].tolist()
     texts = [
         f"{segment_name(name)}: {f'{value:.0f} % ({word})' if np.isfinite(value) else 'fixed'}"
         for name, value, word in zip(fit.estimate.segments, percent, words, strict=True)

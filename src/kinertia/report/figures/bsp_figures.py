@@ -49,24 +49,9 @@ def segment_name(segment: str) -> str:
     return (name + words[side] if name and side in words else segment).replace("_", " ")
 
 
-def departures(fit: Fit) -> np.ndarray | None:
-    """Return the estimate minus the prior's mean (s, 10) in prior SDs, 0 where fixed; None after two-level."""
-    if fit.posterior is None:
-        return None
-    result: np.ndarray | None = (fit.estimate.table() - fit.expected.table()) / _scale(fit.posterior)
-    return result
-
-
 def _scale(posterior: Posterior) -> np.ndarray:
     """Return prior SDs (s, 10); infinite where a parameter is fixed."""
     return np.where(posterior.prior_sd > 0, posterior.prior_sd, np.inf)
-
-
-def estimated_rows(fit: Fit) -> np.ndarray:
-    """Return rows of the segments that were estimated; those with a prior SD of 0 stay as the model has them."""
-    if fit.posterior is None:
-        return np.arange(len(fit.estimate.segments))
-    return np.flatnonzero((fit.posterior.prior_sd > 0).any(axis=1))
 
 
 def change_figure(fit: Fit, columns: Sequence[int] = MAIN, truth: BodySegmentParameters | None = None) -> Figure:
@@ -95,7 +80,7 @@ def change_figure(fit: Fit, columns: Sequence[int] = MAIN, truth: BodySegmentPar
 
 def departure_figure(fit: Fit, columns: Sequence[int] = MAIN) -> Figure | None:
     """Draw the changes in prior SDs, so that feet and trunk share a scale; None after two-level, which has none."""
-    away, posterior, start = departures(fit), fit.posterior, expected_of(fit)
+    away, posterior, start = fit.departures, fit.posterior, expected_of(fit)
     if away is None or posterior is None:
         return None
     shown, rows = _rows(fit)
@@ -116,7 +101,7 @@ def departure_figure(fit: Fit, columns: Sequence[int] = MAIN) -> Figure | None:
 
 def _rows(fit: Fit) -> tuple[np.ndarray, dict[str, Any]]:
     """Return rows of the segments shown, and the axis with their names, downwards."""
-    shown = estimated_rows(fit)
+    shown = fit.estimated_rows
     names = [segment_name(fit.estimate.segments[i]) for i in shown]
     return shown, {**_named(names), "range": [len(names) - 0.4, -0.6]}
 
@@ -194,7 +179,7 @@ def information_figure(fit: Fit) -> Figure | None:
     """
     if fit.posterior is None:
         return None
-    shown = estimated_rows(fit)
+    shown = fit.estimated_rows
     percent = 100 * np.clip(fit.posterior.information[shown], 0.0, 1.0)
     segments = [segment_name(fit.estimate.segments[i]) for i in shown]
     best = np.unravel_index(int(np.nanargmax(percent)), percent.shape)

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kinertia.estimation.result.fit import Fit
-from kinertia.model.skeleton import Skeleton, by_side
+from kinertia.model.skeleton import Skeleton
 from kinertia.motion.model_outputs import CLINICAL_ANGLES
 from kinertia.settings import SignConvention
 from kinertia.trial.data import FEET
@@ -115,7 +115,7 @@ def panels_of(skeleton: Skeleton) -> list[Coordinate]:
 
     Leg coordinates of an OpenSim model are titled by their movement, for either sign, others by their names.
     """
-    sides = by_side(skeleton.coordinates)
+    sides = skeleton.sides
     ours = skeleton.name == "gait27"
     return [
         Coordinate(
@@ -220,7 +220,7 @@ def sign_along(axis: np.ndarray, other: np.ndarray) -> int:
 
 def turning(name: str, side: str, skeleton: Skeleton) -> np.ndarray:
     """Return the unit vector (3,) about which the coordinate rotates the foot, all at zero; zero if it does not."""
-    column = by_side(skeleton.coordinates).get(name, {}).get(side)
+    column = skeleton.sides.get(name, {}).get(side)
     if column is None:
         return np.zeros(3)
     q = np.zeros((2, len(skeleton.coordinates)))

@@ -12,12 +12,18 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.estimation.result.curve_source import Stage
-from kinertia.estimation.result.cycles import FORCES, UNITS, CycleCurve, Kind, curves_by_stage
+from kinertia.estimation.result.cycles import (
+    FORCES,
+    MOST_STRIDES,
+    UNITS,
+    CycleCurve,
+    Kind,
+    curves_by_stage,
+)
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.mean_cycles import common_strides, main_task, mean_of, mean_of_common
 from kinertia.io.norms_file import Norm
-from kinertia.model.skeleton import Skeleton, by_side, opposite_on_left
+from kinertia.model.skeleton import Skeleton, opposite_on_left
 from kinertia.motion.gait_cycle import PERCENT, Phase
 from kinertia.motion.joint_moments import body_joints, component_names, joint_and_side
 from kinertia.motion.model_outputs import CLINICAL_ANGLES
@@ -35,8 +41,6 @@ from kinertia.settings import SignConvention
 from kinertia.trial.data import FEET
 from kinertia.trial.sampled_data import runs
 
-MOST_STRIDES = 100
-"""Largest number of strides of a trial and side; if there are more, this many are taken, evenly spread."""
 _MOST_DRAWN = 5
 """Number of strides drawn per side; mean and bands are of all."""
 _TRUNK = "lumbar"
@@ -52,15 +56,11 @@ _FORCE_TITLES = dict(zip(FORCES, ("Forward +", "Upward +", "Towards the other fo
 
 Curves = Mapping[tuple[str, str], Sequence[CycleCurve]]
 """Curves by quantity and side."""
-CurvesByStage = Mapping[Stage, Sequence[CycleCurve]]
-"""Curves of all trials, as estimated and conventional."""
 Norms = Mapping[str, Norm]
 """Norms by quantity, for both sides."""
 
 
-def cycle_figures(
-    fit: Fit, norms: Norms = MappingProxyType({}), curves: CurvesByStage | None = None, legs: bool = False
-) -> dict[Kind, Figure]:
+def cycle_figures(fit: Fit, norms: Norms = MappingProxyType({}), legs: bool = False) -> dict[Kind, Figure]:
     """Draw all figures over the gait cycle, by kind; none where no trial has a stride, or no stride shows that kind.
 
     Only trials of the main task (`main_task`) are drawn: a mean of walks and turns is neither.
@@ -68,32 +68,27 @@ def cycle_figures(
     Args:
         fit: the fit.
         norms: grey bands below.
-        curves: `drawn_curves` of the fit, where they are known.
         legs: leave out the trunk in figures of joint moments and of an OpenSim model's angles, and powers that are in
             `other_powers`.
     """
-    drawn = _of_main_task(fit, norms, curves, legs)
+    drawn = _of_main_task(fit, norms, legs)
     figures = {} if drawn is None else {kind: drawn.figure(kind) for kind in UNITS}
     return {kind: figure for kind, figure in figures.items() if figure is not None}
 
 
-def other_powers(fit: Fit, curves: CurvesByStage | None = None) -> Figure | None:
+def other_powers(fit: Fit) -> Figure | None:
     """Draw powers about axes other than flexion and extension; None without any."""
-    drawn = _of_main_task(fit, {}, curves, legs=True)
+    drawn = _of_main_task(fit, {}, legs=True)
     return None if drawn is None else replace(drawn, without_flexion=True).figure("power")
 
 
-def _of_main_task(fit: Fit, norms: Norms, curves: CurvesByStage | None, legs: bool) -> "_Drawn | None":
+def _of_main_task(fit: Fit, norms: Norms, legs: bool) -> "_Drawn | None":
     """Collect what the figures over the gait cycle show; None without strides."""
-    fit = main_task(fit)
-    if not any(trial.strides for trial in fit.trials):
+    shown = main_task(fit)
+    if not any(trial.strides for trial in shown.trials):
         return None
-    names = {trial.name for trial in fit.trials}
-    known = curves or drawn_curves(fit)
-    estimate, literature = (
-        _by_quantity(curve for curve in known[stage] if curve.trial in names) for stage in ("estimate", "literature")
-    )
-    return _Drawn(fit, estimate, literature, norms, legs=legs)
+    estimate, literature = (_by_quantity(shown.curves[stage]) for stage in ("estimate", "literature"))
+    return _Drawn(shown, estimate, literature, norms, legs=legs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,12 +101,12 @@ class PhaseFigures:
     figures: dict[Kind, Figure]
 
 
-def phase_figures(fit: Fit, curves: CurvesByStage | None = None, legs: bool = False) -> tuple[PhaseFigures, ...]:
+def phase_figures(fit: Fit, legs: bool = False) -> tuple[PhaseFigures, ...]:
     """Draw the stances and landings of each task over their own percentages, apart from all others.
 
     Of stances the joint moments alone: angles and the rest are in the figures over the gait cycle, or over time.
     """
-    known, result = curves or drawn_curves(fit), []
+    known, result = fit.curves, []
     shown = [curve for curve in known["estimate"] if curve.stride.phase != "stride"]
     for task, phase in dict.fromkeys((curve.task, curve.stride.phase) for curve in shown):
         of_task = {stage: [curve for curve in some if curve.task == task] for stage, some in known.items()}
@@ -134,11 +129,6 @@ def cycle_figure(fit: Fit, kind: Kind, norms: Norms = MappingProxyType({})) -> F
 def estimated_curves(fit: Fit) -> Curves:
     """Return the curves of the estimate from which figures are drawn."""
     return _by_quantity(curves_by_stage(main_task(fit).trials, fit.mass_kg, MOST_STRIDES, ["estimate"])["estimate"])
-
-
-def drawn_curves(fit: Fit) -> CurvesByStage:
-    """Return all curves of a fit from which figures are drawn."""
-    return curves_by_stage(fit.trials, fit.mass_kg, MOST_STRIDES)
 
 
 def _by_quantity(curves: Iterable[CycleCurve], phase: Phase = "stride") -> Curves:
@@ -218,7 +208,7 @@ class _Drawn:
         if kind == "joint_moment":
             return not quantity.startswith(_TRUNK)
         skeleton = self.fit.skeleton
-        columns = by_side(skeleton.coordinates)[quantity.removesuffix("_angle")].values()
+        columns = skeleton.sides[quantity.removesuffix("_angle")].values()
         of_legs = {*range(_ROOT_COORDINATES), *_leg_coordinates(skeleton)}
         return convention_of(self.fit) != "opensim" or bool(of_legs & set(columns))
 

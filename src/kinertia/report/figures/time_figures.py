@@ -117,18 +117,12 @@ def coordinate_figure(trial: TrialFit, skeleton: Skeleton, most_frames: int = MO
             traces += lines_by_side(coordinate, name, time, scale * values, thin, line)
         unit = "degrees" if coordinate.rotational else "m"
         panels.append(Panel(f"{coordinate.title} ({unit})", traces, [*unused, *event_lines(events, coordinate)]))
-    change = np.degrees(motion_change(trial)[:, skeleton.rotational])
+    change = np.degrees(trial.motion_change[:, skeleton.rotational])
     alt = (
         f"Coordinates of {trial.name} over time, inverse kinematics against estimate; the joint angles differ by "
         f"{rms(change):.1f} degrees RMS."
     )
     return small_multiples(panels, alt, axis)
-
-
-def motion_change(trial: TrialFit) -> np.ndarray:
-    """Return estimated coordinates minus those of inverse kinematics (w, c), rad and m; NaN where markers show none."""
-    result: np.ndarray = trial.motion.q - trial.kinematics.ik.q[trial.kinematics.frames]
-    return result
 
 
 def panel_over_time(

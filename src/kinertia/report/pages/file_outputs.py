@@ -99,9 +99,8 @@ def _compared(trial: TrialFit, output: ModelOutput, stated: FileOutputs, mass_kg
     if output.name not in stated.values or output.kind not in _SHOWN:
         return None
     component, factor, unit = _SHOWN[output.kind]
-    theirs = stated.values[output.name][nearest_samples(stated.time, trial.time), component] / moment_divisor(
-        stated, output.kind, mass_kg
-    )
+    divisor = moment_divisor(stated, output.kind, mass_kg)
+    theirs = stated.values[output.name][nearest_samples(stated.time, trial.time), component] / divisor
     if np.isfinite(theirs).sum() < _FEWEST:
         return None
     ours, sd = factor * output.values[:, component], factor * output.sd[:, component]

@@ -10,17 +10,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinertia.diagnostics.result.suitability import Suitability, suitability
-from kinertia.estimation.identifiability import INFORMED, MEASURED, evidence
+from kinertia.diagnostics.result.suitability import Suitability
+from kinertia.estimation.identifiability import INFORMED, MEASURED
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.findings.finding import Severity
 from kinertia.findings.overview import DO_NOT_USE, USES, WITH_CARE
 from kinertia.model.bsp import PARAMETERS
-from kinertia.report.figures.bsp_figures import DEPARTURE_SD, NAMES, departures, estimated_rows, segment_name
+from kinertia.report.figures.bsp_figures import DEPARTURE_SD, NAMES, segment_name
 from kinertia.report.figures.coordinate_titles import title_of
-from kinertia.report.figures.time_figures import motion_change
-from kinertia.report.wording import decimals, expected_of, fixed, read_in
+from kinertia.report.wording import asymmetry_sentences, decimals, expected_of, fixed, read_in
 from kinertia.trial.sampled_data import rms
 
 _LISTED_FAR = 12
@@ -46,25 +45,28 @@ class Words:
     """Description of a fit in sentences.
 
     Attributes:
-        purposes: suitability by purpose.
-        outputs: suitability by output.
         motion: how far the motion was changed.
         knowledge: which body segment parameters the data determine.
         departures: estimates more than two prior SDs from the prior's mean.
+        held: segments that were not estimated; empty where all were.
+        asymmetry: whether left and right differ, by pair of limbs.
+        hidden: number of independent combinations of the estimated parameters that no motion shows.
     """
 
-    purposes: tuple[Purpose, ...]
-    outputs: tuple[Suitability, ...]
     motion: tuple[str, ...]
     knowledge: tuple[str, ...]
     departures: tuple[str, ...]
+    held: str
+    asymmetry: list[str]
+    hidden: int
 
 
 def words(fit: Fit) -> Words:
     """Describe a fit in sentences."""
-    outputs = suitability(fit, fit.findings, fit.left_out)
+    held, hidden = _held(fit), _hidden(fit)
+    knowledge, departures, asymmetry = _knowledge(fit, held, hidden), _departures(fit), asymmetry_sentences(fit)
     motion = tuple(sentence for trial in fit.trials for sentence in _motion(fit, trial))
-    return Words(purposes(outputs, impossible(fit)), outputs, motion, _knowledge(fit), _departures(fit))
+    return Words(motion, knowledge, departures, held, asymmetry, hidden)
 
 
 def impossible(fit: Fit) -> bool:
@@ -107,7 +109,7 @@ def without_repetition(rated: Sequence[Purpose], said: str) -> list[Purpose]:
 
 def _motion(fit: Fit, trial: TrialFit) -> list[str]:
     before, after = (1e3 * rms(trial.marker_errors_m[stage]) for stage in ("ik", "final"))
-    change = motion_change(trial)
+    change = trial.motion_change
     angles = np.flatnonzero(fit.skeleton.rotational)
     by_angle = np.degrees([rms(change[:, k]) for k in angles])
     worst = int(np.nanargmax(by_angle))
@@ -122,14 +124,14 @@ def _motion(fit: Fit, trial: TrialFit) -> list[str]:
     ]
 
 
-def _knowledge(fit: Fit) -> tuple[str, ...]:
+def _knowledge(fit: Fit, held: str, hidden: int) -> tuple[str, ...]:
     if fit.posterior is None:
         return (
             "the two-level method has no error bars, so it is unknown which parameters the data inform. Small "
             "residuals alone prove nothing about single parameters; use the simultaneous method",
         )
     posterior = fit.posterior
-    grades = [evidence(value) for value in posterior.information[posterior.prior_sd > 0]]
+    grades = fit.evidence[posterior.prior_sd > 0].tolist()
     counts = {word: grades.count(word) for word in _EVIDENCE}
     whose = expected_of(fit).whose
     sentences = [
@@ -137,33 +139,32 @@ def _knowledge(fit: Fit) -> tuple[str, ...]:
         f"{100 * MEASURED:g} %), {counts['informed']} partly and {counts['assumed']} not (below {100 * INFORMED:g} %; "
         f'"assumed" in the table): the latter remain about as uncertain as {whose}, even where they moved'
     ]
-    masses = {fit.estimate.segments[i]: evidence(posterior.information[i, 0]) for i in estimated_rows(fit)}
+    masses = {fit.estimate.segments[i]: fit.evidence[i, 0] for i in fit.estimated_rows}
     for word, meaning in _EVIDENCE.items():
         if names := [name for name, knowledge in masses.items() if knowledge == word]:
             sentences.append(f"masses {meaning}: {_segments(names)}")
-    if kept := held_sentence(fit):
-        sentences.append(kept)
+    if held:
+        sentences.append(held)
     if never := posterior.base.never:
         sentences.append(
-            f"{hidden_combinations(fit)} combinations cannot be seen in any motion, such as {never[0]}: all are listed "
-            "above the table"
+            f"{hidden} combinations cannot be seen in any motion, such as {never[0]}: all are listed above the table"
         )
     return tuple(sentences)
 
 
-def held_sentence(fit: Fit) -> str:
+def _held(fit: Fit) -> str:
     """List the segments that were not estimated, in a sentence; empty where all were."""
-    estimated = set(estimated_rows(fit))
+    estimated = set(fit.estimated_rows)
     names = [name for i, name in enumerate(fit.estimate.segments) if i not in estimated]
     return f"fixed at the model's values, not estimated: {_segments(names)}" if names else ""
 
 
-def hidden_combinations(fit: Fit) -> int:
+def _hidden(fit: Fit) -> int:
     """Count independent combinations of the estimated parameters that no motion shows: parameters minus rank."""
     if fit.posterior is None:
         return 0
     base = fit.posterior.base
-    return len(PARAMETERS) * len(estimated_rows(fit)) - base.count
+    return len(PARAMETERS) * len(fit.estimated_rows) - base.count
 
 
 def _segments(names: list[str]) -> str:
@@ -174,7 +175,7 @@ def _segments(names: list[str]) -> str:
 
 
 def _departures(fit: Fit) -> tuple[str, ...]:
-    away = departures(fit)
+    away = fit.departures
     if away is None or fit.posterior is None:
         return ()
     scale = fit.posterior.prior_sd

@@ -4,23 +4,20 @@ plotly.js is in the page once, compressed; its policy (Content-Security-Policy) 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 
-from kinertia.estimation.identifiability import evidence
+from kinertia.diagnostics.result.suitability import suitability
 from kinertia.estimation.result.fit import Fit
+from kinertia.estimation.result.gait_scores import GaitProfile
 from kinertia.estimation.result.leg_moments import coverage_sentence, forces_used, full_bandwidth, gaps_sentence
-from kinertia.estimation.result.mean_cycles import fits_by_task, gait_profile, main_task
 from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.estimation.simultaneous.instruments.instrument_errors import SHOWN_UNIT, item_text, quantity_text
-from kinertia.io.norms_file import Norm
 from kinertia.io.subject.provenance import Provenance
 from kinertia.io.versions import versions
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
-from kinertia.motion.model_outputs import CLINICAL_ANGLES
 from kinertia.report.figures.body_figure import body_figure
 from kinertia.report.figures.bsp_figures import (
     MAIN,
@@ -29,22 +26,14 @@ from kinertia.report.figures.bsp_figures import (
     PRODUCTS,
     change_figure,
     departure_figure,
-    departures,
     information_figure,
     segment_name,
 )
 from kinertia.report.figures.coordinate_titles import convention_of
 from kinertia.report.figures.cycle_figures import (
-    CurvesByStage,
     Norms,
-    PhaseFigures,
-    cycle_figures,
-    drawn_curves,
-    has_spread,
-    other_powers,
-    phase_figures,
 )
-from kinertia.report.figures.figure import SIDE_COLOURS, SIDES, Figure, base_layout, written
+from kinertia.report.figures.figure import SIDE_COLOURS, Figure, written
 from kinertia.report.figures.marker_figures import fit_gap_figure, marker_figure
 from kinertia.report.figures.skeleton_view import scene, view
 from kinertia.report.figures.time_figures import (
@@ -56,15 +45,14 @@ from kinertia.report.figures.time_figures import (
     moment_figure,
     residual_figure,
 )
-from kinertia.report.pages.cycle_table import peak_rows, stride_rows
+from kinertia.report.pages.cycle_view import cycles_view
 from kinertia.report.pages.file_outputs import outputs_view
 from kinertia.report.pages.finding_view import FindingView
-from kinertia.report.pages.headline import held_sentence, hidden_combinations, without_repetition, words
+from kinertia.report.pages.headline import impossible, purposes, without_repetition, words
 from kinertia.report.pages.rendering import rendered
 from kinertia.report.pages.truth_comparison import Truth, truth_rows
 from kinertia.report.pages.vicon_differences import differences_view
-from kinertia.report.wording import INTERVAL_SD, asymmetry_sentences, decimals, expected_of, fixed, read_in, start_of
-from kinertia.trial.data import FEET
+from kinertia.report.wording import INTERVAL_SD, decimals, expected_of, fixed, read_in, start_of
 from kinertia.trial.sampled_data import rms_by_marker, rms_length, runs
 from kinertia.trial.stances import gait_events
 
@@ -83,8 +71,8 @@ def render(
     provenance: Provenance | None = None,
     computed_by: Mapping[str, str] | None = None,
     norms: Norms = MappingProxyType({}),
+    profiles: Mapping[str, GaitProfile] = MappingProxyType({}),
     truth: Truth | None = None,
-    curves: CurvesByStage | None = None,
     template: Template = "report",
 ) -> str:
     """Render the report of a fit, or its letter.
@@ -94,31 +82,35 @@ def render(
         provenance: files and command; a fit made in Python has none.
         computed_by: versions that computed the fit, where they are not the present ones.
         norms: norms of the curves over the gait cycle, drawn as bands behind them.
+        profiles: scores against these norms, by task (`profiles_by_task`).
         truth: truth of a synthetic person.
-        curves: `drawn_curves` of the fit, where they are known.
         template: which page.
     """
-    true_bsp = None if truth is None else truth.bsp
+    true_bsp, about = None if truth is None else truth.bsp, _about(fit, provenance)
     shown = fit.trials[:MOST_TRIALS]
-    covered, gaps, said = coverage_sentence(fit.trials), gaps_sentence(shown), words(fit)
+    gaps, covered = gaps_sentence(shown), coverage_sentence(fit.trials)
+    outputs = suitability(fit, fit.findings, fit.left_out)
+    rated, said = without_repetition(purposes(outputs, impossible(fit)), covered), words(fit)
+    phases, cycle, more_cycles = cycles_view(fit, norms, profiles)
     return rendered(
         f"{template}.html.j2",
         title=f"{fit.subject.name}: gait report",
         fit=fit,
         words=said,
-        purposes=without_repetition(said.purposes, covered),
+        outputs=outputs,
+        purposes=rated,
         start=start_of(fit),
         expected=expected_of(fit),
         found=FindingView([fit.overview]),
-        held=held_sentence(fit),
-        hidden=hidden_combinations(fit),
-        asymmetry=asymmetry_sentences(fit),
+        held=said.held,
+        hidden=said.hidden,
+        asymmetry=said.asymmetry,
         total_mass=[fit.subject.mass_kg, fit.literature.total_mass_kg, fit.estimate.total_mass_kg],
-        cycle=_cycle(fit, norms, curves),
-        more_cycles=[(task, _cycle(task_fit, norms, curves)) for task, task_fit in list(fits_by_task(fit).items())[1:]],
-        phases=[_phase(figures) for figures in phase_figures(fit, curves, legs=True)],
+        phases=phases,
+        cycle=cycle,
+        more_cycles=more_cycles,
         convention=convention_of(fit),
-        about=_about(fit, provenance),
+        about=about,
         sides={side: name for side, (_, name) in SIDE_COLOURS.items()},
         covered=covered,
         gaps=gaps if "%" in covered else "",
@@ -177,48 +169,6 @@ def _written(figure: Figure | None) -> dict[str, Any] | None:
     return None if figure is None else written(figure)
 
 
-def _cycle(fit: Fit, norms: Norms, curves: CurvesByStage | None) -> dict[str, Any] | None:
-    """Collect everything that the templates show of the gait cycle; None where there are no strides."""
-    figures = cycle_figures(fit, norms, curves, legs=True)
-    if not figures:
-        return None
-    clinical, profile = figures.pop("clinical", None), profile_view(fit, norms)
-    fit_of_task = main_task(fit)
-    names = {trial.name for trial in fit_of_task.trials if trial.joint_curves is not None}
-    estimate = (curves or drawn_curves(fit_of_task))["estimate"]
-    strides = [stride for trial in fit_of_task.trials for stride in trial.strides]
-    return {
-        "rows": stride_rows(fit_of_task),
-        "peaks": peak_rows([curve for curve in estimate if curve.trial in names]),
-        "trials": [trial.name for trial in fit_of_task.trials],
-        "norms": bool(norms),
-        "profile": profile,
-        "map": None if profile is None else written(map_figure(profile)),
-        "clinical": None if convention_of(fit) == "opensim" else _written(clinical),
-        "spread": has_spread(clinical or figures["angle"]),
-        "longest": not has_spread(figures["moment"]),
-        "without_strides": [SIDES[side][0] for side in FEET if all(stride.side != side for stride in strides)],
-        "strides": len(strides),
-        "on_plates": sum(stride.on_plates for stride in strides),
-        "other_powers": _written(other_powers(fit, curves)),
-        **{kind: written(figure) for kind, figure in figures.items()},
-    }
-
-
-def _phase(figures: PhaseFigures) -> dict[str, Any]:
-    """Collect everything that the templates show of the stances or landings of one task."""
-    shown = dict.fromkeys((curve.trial, curve.stride) for curve in figures.curves)
-    return {
-        "id": f"{figures.phase}-{figures.task}",
-        "phase": figures.phase,
-        "task": figures.task,
-        "trials": list(dict.fromkeys(trial for trial, _ in shown)),
-        "count": len(shown),
-        "peaks": peak_rows(figures.curves) if figures.phase == "landing" else [],
-        **{kind: written(figure) for kind, figure in figures.figures.items()},
-    }
-
-
 def _trial(fit: Fit, trial: TrialFit, k: int, count: int, truth: Truth | None) -> dict[str, Any]:
     """Collect everything that the templates show of one trial."""
     frames = MOST_FRAMES // count
@@ -274,7 +224,7 @@ def residual_rows(trials: Sequence[TrialFit]) -> list[dict[str, Any]]:
 
 def bsp_rows(fit: Fit) -> list[dict[str, Any]]:
     """Return table rows in kg, mm and kg m2; each number as a value, for sorting, and as text."""
-    away, posterior = departures(fit), fit.posterior
+    away, posterior = fit.departures, fit.posterior
     before, after = fit.literature.table(), fit.estimate.table()
     rows = []
     for i, segment in enumerate(fit.estimate.segments):
@@ -291,7 +241,7 @@ def bsp_rows(fit: Fit) -> list[dict[str, Any]]:
                 size = size if held else posterior.sd[i, k]
                 information = float(posterior.information[i, k])
                 row |= {"away": away[i, k], "information": 0.0 if held else max(100 * information, 0.0), "held": held}
-                row["evidence"] = evidence(information)
+                row["evidence"] = fit.evidence[i, k]
                 row["changed"] = not held and abs(after[i, k] - before[i, k]) > INTERVAL_SD * posterior.sd[i, k]
             for name, value in values.items():
                 row[name] = {"value": value * factor, "text": fixed(value * factor, decimals(k, size))}
@@ -320,79 +270,3 @@ def _marker_rows(trial: TrialFit, sd_m: Mapping[str, float], drifting: tuple[str
             }
         )
     return rows
-
-
-class ScoreRow(NamedTuple):
-    """One variable in words, with its score per side, degrees."""
-
-    variable: str
-    right: str
-    left: str
-
-
-@dataclass(frozen=True)
-class ProfileView:
-    """Gait profile scores in words.
-
-    Attributes:
-        rows: the nine variables, then the score of each side.
-        overall: score of the person, degrees.
-        norm_people: number of people in the norms, if the file states it.
-        remarks: sentences on differences between the norms' people and this person.
-    """
-
-    rows: tuple[ScoreRow, ...]
-    overall: str
-    norm_people: int | None
-    remarks: tuple[str, ...]
-
-
-def profile_view(fit: Fit, norms: Mapping[str, Norm]) -> ProfileView | None:
-    """Compute scores against these norms; None where they lack one of the nine variables."""
-    if not set(CLINICAL_ANGLES) <= set(norms):
-        return None
-    profile = gait_profile(fit, norms)
-    rows = [
-        ScoreRow(title.title, *(_degrees(profile.gvs_deg[quantity, side]) for side in FEET))
-        for quantity, title in CLINICAL_ANGLES.items()
-    ]
-    rows.append(ScoreRow("Gait Profile Score", *(_degrees(profile.gps_deg[side]) for side in FEET)))
-    return ProfileView(tuple(rows), _degrees(profile.overall_deg), profile.norm_people, profile.remarks)
-
-
-def map_figure(view: ProfileView) -> Figure:
-    """Draw the Movement Analysis Profile: a bar per variable and side, the Gait Profile Score last."""
-    traces = [
-        {
-            "type": "bar",
-            "orientation": "h",
-            "x": [_number(getattr(row, side)) for row in view.rows],
-            "y": list(range(len(view.rows))),
-            "name": side,
-            "marker": {"color": SIDES[side[0]][1]},
-            "hovertemplate": "%{x:.1f} degrees<extra>%{fullData.name}</extra>",
-        }
-        for side in ("right", "left")
-    ]
-    layout = base_layout("Movement Analysis Profile: Gait Variable Score of each angle, and Gait Profile Score.")
-    layout |= {
-        "height": 60 + 22 * len(view.rows),
-        "margin": {"t": 30, "b": 40, "l": 130, "r": 14},
-        "barmode": "group",
-        "xaxis": {"title": {"text": "Gait Variable Score (degrees)", "font": {"size": 11}}, "rangemode": "tozero"},
-        "yaxis": {
-            "tickmode": "array",
-            "tickvals": list(range(len(view.rows))),
-            "ticktext": [row.variable for row in view.rows],
-            "autorange": "reversed",
-        },
-    }
-    return Figure(traces, layout)
-
-
-def _number(degrees: str) -> float | None:
-    return None if degrees == "–" else float(degrees)
-
-
-def _degrees(value: float) -> str:
-    return f"{value:.1f}" if np.isfinite(value) else "–"

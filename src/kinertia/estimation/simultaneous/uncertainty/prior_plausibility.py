@@ -198,7 +198,7 @@ def asymmetries(bsp: BodySegmentParameters, covariance: np.ndarray) -> list[Asym
     return pairs
 
 
-def asymmetry_columns(pairs: list[Asymmetry]) -> dict[str, list[object]]:
+def asymmetry_columns(pairs: Sequence[Asymmetry]) -> dict[str, list[object]]:
     """Return the columns of a table of pairs and parameters: segment, parameter, right_minus_left, sd, differs."""
     rows = [
         (pair.segment, name, float(pair.difference[k]), float(pair.sd[k]), k in pair.differing)
