@@ -22,11 +22,10 @@ from kinertia.io.marker_positions.landmark_search import (
     wands,
 )
 from kinertia.io.marker_positions.standing_body import WHERE, StandingBody, body_axes
-from kinertia.io.marker_set_file import marker_set_of, nearest_preset, preset_names, read_marker_set
-from kinertia.io.text.toml_lines import quoted
+from kinertia.io.marker_set_file import marker_set_of, marker_set_text, nearest_preset, preset_names, read_marker_set
 from kinertia.model.gait27 import build_gait27
 from kinertia.model.joint_centres import find_landmarks
-from kinertia.model.marker_set import LANDMARKS, SEGMENTS, WIDTHS, MarkerSet, folded, label_share
+from kinertia.model.marker_set import WIDTHS, MarkerSet, folded, label_share
 from kinertia.model.static_landmarks import departures, device_labels, with_alignment_device
 from kinertia.trial.data import FloatArray, Markers, Recording
 from kinertia.trial.marker_quality import STILL_M_S, speed_m_s
@@ -46,10 +45,6 @@ _NEAR = 0.85
 _ANY_WIDTH_M, _USUAL_HEIGHT_M = 0.09, 1.7
 """Whether landmarks suffice depends on neither."""
 _LEG = ("asis", "knee_lateral", "ankle_lateral", "heel", "metatarsal")
-_WIDTHS = """# Joints without a medial marker: the widths in the PROCESSING group of the static C3D file, by its names.
-# For other files give them as knee_width_mm and so on under [subject] of a subject file."""
-# For other files give them as knee_width_mm and so on under [subject] of a subject file."""
-_NEEDED = tuple(name for name in LANDMARKS if not name.startswith(("thigh_wand", "shank_wand", "head_top")))
 
 
 @dataclass(frozen=True)
@@ -344,43 +339,6 @@ def known_places(labels: Sequence[str]) -> tuple[dict[str, list[str]], dict[str,
     """Return landmarks and segments with the labels that are known by name."""
     landmarks = _placed(labels, dict(_names("landmarks", labels)), single=True)
     return landmarks, _placed(labels, dict(_names("segments", labels)), single=False)
-
-
-def marker_set_text(
-    name: str,
-    landmarks: Mapping[str, Sequence[str]],
-    segments: Mapping[str, Sequence[str]],
-    widths: Mapping[str, str],
-    labels: Sequence[str],
-    heading: str,
-    how: Mapping[str, str] | None = None,
-) -> str:
-    """Return the text of a marker set (TOML); labels and entries that it lacks are in comments."""
-    lines = [heading, f"name = {quoted(name)}", "", "[landmarks]"]
-    for landmark in LANDMARKS:
-        landmark_labels = landmarks.get(landmark)
-        if landmark_labels:
-            reason = "" if how is None or landmark not in how else f"  # {how[landmark]}"
-            lines.append(f"{landmark} = {_listed(landmark_labels)}{reason}")
-        elif landmark in _NEEDED:
-            lines.append(f'# {landmark} = ""  # FILL IN, if there is one')
-    lines += ["", "[segments]"]
-    for segment in SEGMENTS:
-        if landmark_labels := segments.get(segment):
-            lines.append(f"{segment} = {_listed(landmark_labels)}")
-        else:
-            lines.append(f"# {segment} = []  # FILL IN")
-    if widths:
-        lines += ["", _WIDTHS, "[widths]", *(f"{joint} = {quoted(width)}" for joint, width in widths.items())]
-    placed = {label for segment_labels in segments.values() for label in segment_labels}
-    rest = [label for label in labels if label not in placed]
-    if rest:
-        lines += ["", f"# Not placed; FILL IN where they belong: {', '.join(rest)}"]
-    return "\n".join(lines) + "\n"
-
-
-def _listed(labels: Sequence[str]) -> str:
-    return "[" + ", ".join(map(quoted, labels)) + "]"
 
 
 def _names(table: str, labels: Sequence[str]) -> Iterator[tuple[str, str]]:

@@ -1,10 +1,10 @@
-"""Reads marker sets from TOML files: the package's presets, and a user's own of the same form.
+"""Reads marker sets from TOML files, the package's presets and a user's own of the same form; words such files.
 
 Copy one from `src/kinertia/io/marker_sets/` and change it.
 """
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -12,7 +12,7 @@ from pathlib import Path
 from kinertia.errors import FileError, expect_file
 from kinertia.findings.extensions import MARKER_SETS, loaded, names
 from kinertia.findings.quantity import Quantity
-from kinertia.io.text.toml_lines import TomlFile, parse_toml, read_toml
+from kinertia.io.text.toml_lines import TomlFile, parse_toml, quoted, read_toml
 from kinertia.model.marker_set import (
     LANDMARKS,
     SEGMENTS,
@@ -26,6 +26,10 @@ from kinertia.model.marker_set import (
     without_computed_sacrum,
 )
 from kinertia.trial.data import Markers
+
+_WIDTHS = """# Joints without a medial marker: the widths in the PROCESSING group of the static C3D file, by its names.
+# For other files give them as knee_width_mm and so on under [subject] of a subject file."""
+_NEEDED = tuple(name for name in LANDMARKS if not name.startswith(("thigh_wand", "shank_wand", "head_top")))
 
 
 @cache
@@ -161,3 +165,40 @@ def _wrong(path: Path, line: int | None, problem: str) -> FileError:
 
 def _labels(value: str | Sequence[str]) -> tuple[str, ...]:
     return (value,) if isinstance(value, str) else tuple(value)
+
+
+def marker_set_text(
+    name: str,
+    landmarks: Mapping[str, Sequence[str]],
+    segments: Mapping[str, Sequence[str]],
+    widths: Mapping[str, str],
+    labels: Sequence[str],
+    heading: str,
+    how: Mapping[str, str] | None = None,
+) -> str:
+    """Return the text of a marker set (TOML); labels and entries that it lacks are in comments."""
+    lines = [heading, f"name = {quoted(name)}", "", "[landmarks]"]
+    for landmark in LANDMARKS:
+        landmark_labels = landmarks.get(landmark)
+        if landmark_labels:
+            reason = "" if how is None or landmark not in how else f"  # {how[landmark]}"
+            lines.append(f"{landmark} = {_listed(landmark_labels)}{reason}")
+        elif landmark in _NEEDED:
+            lines.append(f'# {landmark} = ""  # FILL IN, if there is one')
+    lines += ["", "[segments]"]
+    for segment in SEGMENTS:
+        if landmark_labels := segments.get(segment):
+            lines.append(f"{segment} = {_listed(landmark_labels)}")
+        else:
+            lines.append(f"# {segment} = []  # FILL IN")
+    if widths:
+        lines += ["", _WIDTHS, "[widths]", *(f"{joint} = {quoted(width)}" for joint, width in widths.items())]
+    placed = {label for segment_labels in segments.values() for label in segment_labels}
+    rest = [label for label in labels if label not in placed]
+    if rest:
+        lines += ["", f"# Not placed; FILL IN where they belong: {', '.join(rest)}"]
+    return "\n".join(lines) + "\n"
+
+
+def _listed(labels: Sequence[str]) -> str:
+    return "[" + ", ".join(map(quoted, labels)) + "]"

@@ -259,8 +259,7 @@ class Recording:
 
     def _repr_html_(self) -> str:
         """Return the HTML summary for a notebook: frames, markers and their gaps, force plates, notes."""
-        html: str = report_function("recording_html")(self)
-        return html
+        return str(report_function("recording_html")(self))
 
 
 @dataclass(frozen=True, eq=False)
@@ -379,8 +378,7 @@ class Trial:
 
     def _repr_html_(self) -> str:
         """Return the HTML summary for a notebook: frames, markers and their gaps, measured windows, notes."""
-        html: str = report_function("trial_html")(self)
-        return html
+        return str(report_function("trial_html")(self))
 
     def rotated(self, rotation: FloatArray) -> Trial:
         """Return the trial, markers, loads and outputs alike, in axes rotated about the vertical: new = rotation @ old.

@@ -18,8 +18,8 @@ from kinertia.cli.web.library import Library, PersonFolder
 from kinertia.cli.web.responses import expect, form, page, to
 from kinertia.diagnostics.markers.marker_set import match_labels
 from kinertia.errors import FileError, KinertiaError, SettingsError
-from kinertia.io.marker_set_draft import marker_set_text, places_of
-from kinertia.io.marker_set_file import preset_names, read_marker_set
+from kinertia.io.marker_set_draft import places_of
+from kinertia.io.marker_set_file import marker_set_text, preset_names, read_marker_set
 from kinertia.io.opensim.reader import read_osim
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.recording import read_recording
