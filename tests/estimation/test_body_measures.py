@@ -14,7 +14,7 @@ from kinertia.io.subject.tables import PriorFiles
 from kinertia.model.stadium_body import measures
 from kinertia.synthetic.walk import HEIGHT_M, MASS_KG, walking_subject
 from kinertia.workflow.from_files import prepare_subject
-from kinertia.workflow.known_body import with_known_body
+from kinertia.workflow.known_body import KnownBody
 from stadium_people import stadium_people
 from validation.usual_build import stadium_mass_kg, stature_m
 
@@ -159,9 +159,8 @@ def test_a_filled_in_sheet_is_part_of_the_prior_and_of_the_notes(c3d_lab, tmp_pa
     assert any("2 of 58" in source and "measures.csv" in source for source in sources)
     assert [finding.where.part for finding in ready.findings if finding.code == "S403"] == ["leg_calf_girth"]
     assert "S404" not in {finding.code for finding in ready.findings}
-    of_another = with_known_body(
-        replace(ready, findings=()), PriorFiles(), None, {}, measures=BodyMeasures("dan.csv", stated(factor=1.1))
-    )
+    known = KnownBody(PriorFiles(), measures=BodyMeasures("dan.csv", stated(factor=1.1)))
+    of_another = known.measured_on(replace(ready, findings=()))
     (found,) = [finding for finding in of_another.findings if finding.code == "S404"]
     assert (found.where.file, found.evidence["stated_kg"].value) == ("dan.csv", ready.total_mass.body_kg)
     assert found.evidence["yeadon_kg"].value > 1.2 * ready.total_mass.body_kg

@@ -16,7 +16,7 @@ from kinertia.model.bsp import PARAMETERS
 from kinertia.settings import KnownSegment, PriorSettings
 from kinertia.synthetic.walk import walking_subject
 from kinertia.workflow.estimate import named_by_source
-from kinertia.workflow.known_body import with_known_body
+from kinertia.workflow.known_body import KnownBody
 
 
 @pytest.fixture
@@ -33,7 +33,8 @@ def sources(ready):
 
 
 def informed(ready, settings=None, earlier=None, **segments):
-    return with_known_body(ready, settings or PriorSettings(), earlier, segments)
+    body = KnownBody(settings or PriorSettings(), earlier, segments)
+    return body.measured_on(body.leaned_on(ready)[0])
 
 
 def test_warnings_name_the_prior_where_more_is_known(ready):
@@ -116,7 +117,7 @@ def test_a_group_is_of_the_built_in_model(ready):
     size = len(ready.prior.covariance)
     group = LearntPrior(ready.prior.mean.segments, np.zeros(size), np.ones(size), np.eye(size), 12)
     with pytest.raises(PriorError, match="is for the built-in model; OpenSim models have other segments"):
-        with_known_body(replace(ready, file=object()), PriorSettings(), None, {}, group)
+        KnownBody(PriorSettings(), group=group).leaned_on(replace(ready, file=object()))
 
 
 def test_sides_and_masses(ready):

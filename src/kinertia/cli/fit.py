@@ -42,7 +42,7 @@ from kinertia.errors import FileError, KinertiaError, expect_path
 from kinertia.io.file_names import command_line, same_folder
 from kinertia.io.recording import expect_recording
 from kinertia.io.subject.provenance import provenance_of
-from kinertia.io.subject.reader import read_subject, subject_from_options, with_settings
+from kinertia.io.subject.reader import read_subject, subject_file_in, subject_from_options, with_settings
 from kinertia.io.subject.tables import SubjectFile
 from kinertia.report.exports.contents import FitContent, content_of
 from kinertia.report.exports.files import FIT_FILES, TRIAL_FILES, write_content
@@ -230,10 +230,11 @@ def _wanted(trial: Path, options: dict[str, Any], method: str | None) -> Subject
     if trial.suffix.lower() != ".toml" and not trial.is_dir():
         content = _content(trial, options)
         wanted = subject_from_options(content)
-    elif given := [name for name, value in options.items() if value is not None]:
-        raise FileError(trial, f"a subject file contains everything; put {', '.join(given)} into it instead")
-    else:
+    elif not (given := [name for name, value in options.items() if value is not None]):
         wanted = read_subject(trial)
+    else:
+        path = subject_file_in(trial) if trial.is_dir() else trial
+        raise FileError(path, f"a subject file contains everything; put {', '.join(given)} into it instead")
     return wanted if method is None else with_settings(wanted, method=method)
 
 

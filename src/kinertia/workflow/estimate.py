@@ -35,7 +35,7 @@ from kinertia.motion.workload import one_blas_thread
 from kinertia.settings import Attached, Overrule, Settings, Subject
 from kinertia.trial.data import Recording
 from kinertia.trial.trial_input import TrialInput
-from kinertia.workflow.masses import at_mass_of_plates, with_attached
+from kinertia.workflow.masses import at_mass_of_plates
 from kinertia.workflow.prepare import prepare
 
 _BEYOND_EDGE = "P282"
@@ -76,8 +76,8 @@ def estimate_bsp(
         KinertiaError: the subject, a marker set, the model or a trial cannot be used; the message states why and what
             to do.
     """
-    ready = prepare(subject, source, inputs, settings, marker_set, progress, attached, overrule, calibrate)
-    return estimate(ready if prior is None else replace(ready, prior=prior), progress, terms)
+    ready = prepare(subject, source, inputs, settings, marker_set, progress, prior, attached, overrule, calibrate)
+    return estimate(ready, progress, terms)
 
 
 @one_blas_thread
@@ -94,8 +94,7 @@ def estimate(
     Raises:
         KinertiaError: the trials contradict each other, or the scale.
     """
-    settings, ready = ready.settings, with_attached(ready)
-    started = time.perf_counter()
+    settings, started = ready.settings, time.perf_counter()
     if settings.method == "two-level":
         if terms:
             raise SettingsError.of_entry("method", 'expected "simultaneous": only this estimate has cost terms')

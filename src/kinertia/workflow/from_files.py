@@ -22,7 +22,6 @@ from kinertia.io.subject.reader import read_subject
 from kinertia.io.subject.tables import InstrumentsFiles, PriorFiles, SubjectFile
 from kinertia.settings import Overrule
 from kinertia.workflow.estimate import estimate
-from kinertia.workflow.masses import with_attached
 from kinertia.workflow.person import read_person
 from kinertia.workflow.prepare import prepared
 from kinertia.workflow.screening import screen
@@ -32,6 +31,7 @@ if TYPE_CHECKING:
     from kinertia.estimation.simultaneous.terms.cost_term import CostTerm
     from kinertia.io.subject.body_files import BodyMeasures
     from kinertia.io.subject.learnt_files import PersonInstruments
+    from kinertia.workflow.known_body import KnownBody
 
 
 def prepare_subject(
@@ -55,7 +55,10 @@ def prepare_subject(
     session = _session(wanted)
     measures = _measures(wanted)
     screened = screen(read_person(wanted, progress).with_overrule(overrule or Overrule()))
-    ready = with_attached(_with_known_body(prepared(screened, wanted.settings, progress), wanted, measures))
+    body = _known_body(wanted, measures)
+    ready = prepared(screened, wanted.settings, progress, known=body)
+    if wanted.settings.method == "two-level" and not _only_tables(wanted):
+        ready = _with_unused(ready, "[prior] and [segment]")
     if known.model_copy(update={"date": None, "zeroed": False, "plates": None}) == InstrumentsFiles():
         return ready
     if wanted.settings.method == "two-level":
@@ -97,17 +100,21 @@ def _measures(wanted: SubjectFile) -> BodyMeasures | None:
     return read_measures(wanted.prior.measures)
 
 
-def _with_known_body(ready: Prepared, wanted: SubjectFile, measures: BodyMeasures | None) -> Prepared:
-    if wanted.prior == PriorFiles() and not wanted.segments:
-        return ready
-    if wanted.settings.method == "two-level":
-        return _with_unused(ready, "[prior] and [segment]")
+def _only_tables(wanted: SubjectFile) -> bool:
+    """Return whether nothing is known of the body besides mass, height and sex."""
+    return wanted.prior == PriorFiles() and not wanted.segments
+
+
+def _known_body(wanted: SubjectFile, measures: BodyMeasures | None) -> KnownBody | None:
+    """Return what is known of the body besides mass, height and sex, for a method that uses it; None if nothing."""
+    if _only_tables(wanted) or wanted.settings.method == "two-level":
+        return None
     from kinertia.io.subject.body_files import read_bsp
-    from kinertia.workflow.known_body import with_known_body
+    from kinertia.workflow.known_body import KnownBody
 
     earlier = None if wanted.prior.bsp is None else read_bsp(wanted.prior.bsp)
     group = None if wanted.prior.population is None else _group(wanted, wanted.prior.population)
-    return with_known_body(ready, wanted.prior, earlier, wanted.segments, group, measures)
+    return KnownBody(wanted.prior, earlier, wanted.segments, group, measures)
 
 
 def _with_unused(ready: Prepared, entry: str) -> Prepared:

@@ -6,7 +6,7 @@ precision, and correlated parameters (of the other side, or the trunk that a thi
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -23,7 +23,6 @@ from kinertia.io.subject.body_files import BodyMeasures, BspTable
 from kinertia.model.bsp import PARAMETERS, UNITS, BodySegmentParameters
 from kinertia.model.stadium_body import measures as all_measures
 from kinertia.settings import Attached, KnownSegment, PriorSettings
-from kinertia.workflow.masses import with_attached
 
 _PROSTHESIS_MASS_SD, _PROSTHESIS_SPREAD = 0.4, 3.0
 """Relative SD of a prosthesis' mass, and the factor on the tables' other SDs."""
@@ -31,94 +30,97 @@ _KEPT_SHARE = 1e-3
 """SD of a fixed mass, over its prior's."""
 
 
-def with_known_body(
-    ready: Prepared,
-    settings: PriorSettings,
-    earlier: BspTable | None,
-    segments: Mapping[str, KnownSegment],
-    group: LearntPrior | None = None,
-    measures: BodyMeasures | None = None,
-) -> Prepared:
-    """Update the prior of a prepared person with what is known besides mass, height and sex.
+@dataclass(frozen=True, eq=False)
+class KnownBody:
+    """What is known of a person's body besides mass, height and sex.
 
-    Args:
-        ready: the person with the literature's prior.
+    Attributes:
         settings: settings of the prior.
         earlier: an earlier estimate with SDs, in place of the literature's.
         segments: measured parameters by segment.
         group: prior learnt from the person's group, in place of the literature's.
         measures: girths and lengths of the person.
-
-    Raises:
-        PriorError: both an earlier estimate and a group, a segment that the model lacks, either of another model, or
-            measures that cannot be used.
     """
-    body = len(ready.prior.mean.segments)
-    ready = with_attached(*_leaning_on(ready, settings, earlier, segments, group))
-    prior, found = ready.prior, list(ready.findings)
-    if measures is not None:
-        prior, more = _with_measures(ready, prior, segments, measures)
-        found += more
-    measured = _measured(prior, segments)
-    for (row, column), (value, sd) in measured.items():
-        k = 10 * row + column
-        segment, parameter = prior.mean.segments[row], PARAMETERS[column]
-        expected, expected_sd = prior.mean.table().ravel()[k], float(np.sqrt(prior.covariance[k, k]))
-        unit = UNITS[column]
-        stated = Quantity(value, unit, sd=sd)
-        source = segments[segment].source or "no source given"
-        found.append(_leans_on(f"{segment} {parameter}, {shown(stated)} +- {sd:.2g} ({source})"))
-        distance = abs(value - expected) / float(np.hypot(expected_sd, sd))
-        if distance > KNOWN_BODY_SD:
+
+    settings: PriorSettings
+    earlier: BspTable | None = None
+    segments: Mapping[str, KnownSegment] = field(default_factory=dict)
+    group: LearntPrior | None = None
+    measures: BodyMeasures | None = None
+
+    def leaned_on(self, ready: Prepared) -> tuple[Prepared, Collection[str]]:
+        """Return the person with the prior before measurements, and segments whose masses are not tied to body mass.
+
+        Args:
+            ready: the person with the literature's prior, of the body alone.
+
+        Raises:
+            PriorError: both an earlier estimate and a group, a segment that the model lacks, or either is of another
+                model.
+        """
+        prior, found = ready.prior, list(ready.findings)
+        if self.group is not None:
+            if self.earlier is not None:
+                raise PriorError("[prior] has both bsp and population; the person's own estimate says more: keep bsp")
+            if ready.file is not None:
+                raise PriorError("[prior] population is for the built-in model; OpenSim models have other segments")
+            prior = replace(self.group.of(literature_prior(ready.literature)), mass_sd_kg=prior.mass_sd_kg)
+            found.append(_leans_on(f"learnt from {self.group.people} people in place of the literature's"))
+        if self.earlier is not None:
+            prior = _from_earlier(prior, self.earlier)
+            found.append(_leans_on(f"{self.earlier.name} in place of the literature; it must not include these trials"))
+        if self.settings.sides_correlation is not None:
+            covariance = with_symmetry(prior.covariance, prior.mean.segments, self.settings.sides_correlation)
+            prior = replace(prior, covariance=covariance)
+        artificial = [name for name, known in self.segments.items() if known.prosthesis]
+        for name in artificial:
+            prior = with_prosthesis(prior, name)
             found.append(
-                finding(
-                    "S402",
-                    Where(part=f"{segment} {parameter}"),
-                    distance_sd=Quantity(distance, "1", limit=KNOWN_BODY_SD),
-                    stated=stated,
-                    expected=Quantity(float(expected), unit, sd=expected_sd),
-                )
+                _leans_on(f"{name} is a declared prosthesis: neither reference data nor symmetry is used for it")
             )
-    if settings.masses_kept:
-        kept = _kept(prior, body, ready.attached)
-        measured = {**kept, **measured}
-        found.append(_leans_on("masses kept as they are"))
-    return replace(ready, prior=_given(prior, measured), findings=tuple(found))
+        by_itself = artificial if self.earlier is None else prior.mean.segments
+        return replace(ready, prior=prior, findings=tuple(found)), by_itself
+
+    def measured_on(self, ready: Prepared) -> Prepared:
+        """Update the prior of the body, and what is attached to it, with measurements.
+
+        Raises:
+            PriorError: a segment that the model lacks, or measures that cannot be used.
+        """
+        prior, found = ready.prior, list(ready.findings)
+        if self.measures is not None:
+            prior, more = _with_measures(ready, prior, self.segments, self.measures)
+            found += more
+        measured = _measured(prior, self.segments)
+        for (row, column), (value, sd) in measured.items():
+            k = 10 * row + column
+            segment, parameter = prior.mean.segments[row], PARAMETERS[column]
+            expected, expected_sd = prior.mean.table().ravel()[k], float(np.sqrt(prior.covariance[k, k]))
+            unit = UNITS[column]
+            stated = Quantity(value, unit, sd=sd)
+            source = self.segments[segment].source or "no source given"
+            found.append(_leans_on(f"{segment} {parameter}, {shown(stated)} +- {sd:.2g} ({source})"))
+            distance = abs(value - expected) / float(np.hypot(expected_sd, sd))
+            if distance > KNOWN_BODY_SD:
+                found.append(
+                    finding(
+                        "S402",
+                        Where(part=f"{segment} {parameter}"),
+                        distance_sd=Quantity(distance, "1", limit=KNOWN_BODY_SD),
+                        stated=stated,
+                        expected=Quantity(float(expected), unit, sd=expected_sd),
+                    )
+                )
+        if self.settings.masses_kept:
+            kept = _kept(prior, len(prior.mean.segments) - len(ready.attached), ready.attached)
+            measured = {**kept, **measured}
+            found.append(_leans_on("masses kept as they are"))
+        return replace(ready, prior=_given(prior, measured), findings=tuple(found))
 
 
 def _leans_on(source: str) -> Finding:
     """Return S408, which states the source of the prior."""
     return finding("S408", source=Quantity(source))
-
-
-def _leaning_on(
-    ready: Prepared,
-    settings: PriorSettings,
-    earlier: BspTable | None,
-    segments: Mapping[str, KnownSegment],
-    group: LearntPrior | None,
-) -> tuple[Prepared, Collection[str]]:
-    """Return the person with the prior before measurements, and segments whose masses are not tied to body mass."""
-    prior, found = ready.prior, list(ready.findings)
-    if group is not None:
-        if earlier is not None:
-            raise PriorError("[prior] has both bsp and population; the person's own estimate says more: keep bsp")
-        if ready.file is not None:
-            raise PriorError("[prior] population is for the built-in model; OpenSim models have other segments")
-        prior = replace(group.of(literature_prior(ready.literature)), mass_sd_kg=prior.mass_sd_kg)
-        found.append(_leans_on(f"learnt from {group.people} people in place of the literature's"))
-    if earlier is not None:
-        prior = _from_earlier(prior, earlier)
-        found.append(_leans_on(f"{earlier.name} in place of the literature; it must not include these trials"))
-    if settings.sides_correlation is not None:
-        covariance = with_symmetry(prior.covariance, prior.mean.segments, settings.sides_correlation)
-        prior = replace(prior, covariance=covariance)
-    artificial = [name for name, known in segments.items() if known.prosthesis]
-    for name in artificial:
-        prior = with_prosthesis(prior, name)
-        found.append(_leans_on(f"{name} is a declared prosthesis: neither reference data nor symmetry is used for it"))
-    by_itself = artificial if earlier is None else prior.mean.segments
-    return replace(ready, prior=prior, findings=tuple(found)), by_itself
 
 
 def _kept(prior: BspPrior, body: int, attached: Sequence[Attached]) -> dict[tuple[int, int], tuple[float, float]]:

@@ -43,7 +43,7 @@ _UNINFORMED = (0.1, 0.9)
 
 
 def with_attached(ready: Prepared, by_itself: Collection[str] = ()) -> Prepared:
-    """Add segments for `ready.attached` after the body's own; a person who has them already stays unchanged.
+    """Add segments for `ready.attached` after the body's own.
 
     Args:
         ready: the person.
@@ -52,7 +52,7 @@ def with_attached(ready: Prepared, by_itself: Collection[str] = ()) -> Prepared:
     Raises:
         PriorError: no such segment, or a name that is taken.
     """
-    if not ready.attached or ready.prior.weighed is not None:
+    if not ready.attached:
         return ready
     stated_mass_kg = known(ready.subject.mass_kg)
     skeleton, prior = with_attached_prior(ready.skeleton, ready.prior, ready.attached, stated_mass_kg, by_itself)

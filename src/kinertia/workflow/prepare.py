@@ -4,21 +4,28 @@ There is one road: the usable trials, a model adapted to them, and their kinemat
 (`built_in_model`, `opensim_model`) take the same and return the same, a `PersonModel`.
 """
 
+from __future__ import annotations
+
 import time
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from kinertia.diagnostics.subject.body_data import stated_ranges
 from kinertia.errors import SettingsError
 from kinertia.estimation.prepared import Prepared, Progress, check_trials
+from kinertia.estimation.prior import BspPrior
 from kinertia.model.imported_model import OsimModel
 from kinertia.model.marker_set import MarkerSet
 from kinertia.motion.workload import one_blas_thread
 from kinertia.settings import Attached, Overrule, Settings, Subject
 from kinertia.trial.data import Recording
 from kinertia.trial.trial_input import TrialInput
-from kinertia.workflow.masses import with_doubted_mass
+from kinertia.workflow.masses import with_attached, with_doubted_mass
 from kinertia.workflow.person import Person, PersonModel, RotatedTrial, expect_forces, solved_trials, usable_trial
 from kinertia.workflow.screening import Screened, screen
+
+if TYPE_CHECKING:
+    from kinertia.workflow.known_body import KnownBody
 
 
 @one_blas_thread
@@ -29,6 +36,7 @@ def prepare(
     settings: Settings | None = None,
     marker_set: MarkerSet | None = None,
     progress: Progress = lambda stage, share: None,
+    prior: BspPrior | None = None,
     attached: Sequence[Attached] = (),
     overrule: Overrule | None = None,
     calibrate: bool = False,
@@ -50,16 +58,29 @@ def prepare(
         attached=attached,
         overrule=overrule or Overrule(),
     )
-    return prepared(screen(person), settings or Settings(), progress)
+    return prepared(screen(person), settings or Settings(), progress, prior)
 
 
 @one_blas_thread
-def prepared(screened: Screened, settings: Settings, progress: Progress = lambda stage, share: None) -> Prepared:
-    """Prepare a screened person: a model on all trials that can be used.
+def prepared(
+    screened: Screened,
+    settings: Settings,
+    progress: Progress = lambda stage, share: None,
+    prior: BspPrior | None = None,
+    known: KnownBody | None = None,
+) -> Prepared:
+    """Prepare a screened person: a model on all trials that can be used, and all that is known of the body.
+
+    Args:
+        screened: the person.
+        settings: as wanted.
+        progress: called as the work goes on.
+        prior: of the body's parameters; the model's if None.
+        known: what is known of the body besides.
 
     Raises:
         BlockedError: findings leave no trial, with all of them.
-        KinertiaError: the subject cannot be used.
+        KinertiaError: the subject cannot be used, or what is known of the body.
     """
     person = screened.person
     if person.attached and settings.method == "two-level":
@@ -78,12 +99,12 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
     solved = solved_trials(model.skeleton, model.trials, settings.cutoff_hz, calibration_s, progress)
     found = [*model.findings, *stated_ranges(model.subject), *solved.findings, *model.assumed]
     findings = screened.overruled([*screened.findings, *found])
-    return Prepared(
+    ready = Prepared(
         subject=model.subject,
         settings=settings,
         skeleton=model.skeleton,
         literature=model.uncertainty.whole(model.prior.mean),
-        prior=with_doubted_mass(model.prior, screened.findings),
+        prior=with_doubted_mass(model.prior, screened.findings) if prior is None else prior,
         uncertainty=model.uncertainty,
         file=person.model,
         kinematics=solved.with_forces.kinematics,
@@ -99,6 +120,9 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
         torso_rotation_rad=model.torso_rotation_rad,
         functional=solved.without_forces,
     )
+    ready, by_itself = (ready, ()) if known is None else known.leaned_on(ready)
+    ready = with_attached(ready, by_itself)
+    return ready if known is None else known.measured_on(ready)
 
 
 def _model(screened: Screened, trials: Sequence[RotatedTrial], settings: Settings) -> PersonModel:
