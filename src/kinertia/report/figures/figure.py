@@ -45,8 +45,7 @@ STAGES = {
 }
 """Line of each stage of the residuals."""
 FONT = "system-ui, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
-_BEST = 9
-_BOTTOM_PX, _RIGHT_PX = 44, 14
+_BEST, _BOTTOM_PX, _RIGHT_PX = 9, 44, 14
 _LEGEND_ROW_PX, _LEGEND_PER_ROW = 27, {1: 1, 2: 2, 3: 4}
 _TITLE_PX, _TICKS_PX, _NOMINAL_WIDTH_PX = 30, 40, 960
 MOST_COLUMNS = 3
@@ -66,8 +65,7 @@ _AXIS = {
     "tickfont": {"size": 11},
     "automargin": False,
 }
-_COLOURS = (GREY, BLUE, ORANGE, GREEN)
-_BARS = (BLUE, SKY, PALE, VERMILION)
+_COLOURS, _BARS = (GREY, BLUE, ORANGE, GREEN), (BLUE, SKY, PALE, VERMILION)
 _SYMBOLS = ("circle-open", "circle", "diamond", "square")
 _ROW_PX, _LEFT_PX, _LETTERS = 34, 150, 22
 
@@ -101,8 +99,7 @@ class Figure:
     @property
     def alt(self) -> str:
         """Description of the figure in words."""
-        text: str = self.layout["meta"]["alt"]
-        return text
+        return str(self.layout["meta"]["alt"])
 
     def to_json(self) -> str:
         """Return traces and layout as JSON for plotly.js.
@@ -145,8 +142,7 @@ def script_path() -> Path:
 
 def packed_script() -> str:
     """Return the script, gzip in base64; compressed again only where another plotly was installed since."""
-    script = script_path()
-    state = script.stat()
+    state = (script := script_path()).stat()
     kept = cache_folder() / f"plotly-{state.st_size}-{state.st_mtime_ns}.txt"
     with suppress(OSError):
         return kept.read_text(encoding="ascii")
