@@ -230,11 +230,11 @@ def _wanted(trial: Path, options: dict[str, Any], method: str | None) -> Subject
     if trial.suffix.lower() != ".toml" and not trial.is_dir():
         content = _content(trial, options)
         wanted = subject_from_options(content)
-    elif not (given := [name for name, value in options.items() if value is not None]):
-        wanted = read_subject(trial)
     else:
         path = subject_file_in(trial) if trial.is_dir() else trial
-        raise FileError(path, f"a subject file contains everything; put {', '.join(given)} into it instead")
+        if given := [name for name, value in options.items() if value is not None]:
+            raise FileError(path, f"a subject file contains everything; put {', '.join(given)} into it instead")
+        wanted = read_subject(path)
     return wanted if method is None else with_settings(wanted, method=method)
 
 

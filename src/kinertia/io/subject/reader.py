@@ -96,7 +96,7 @@ def read_subject(path: str | Path, to_fit: bool = True) -> SubjectFile:
     """Read and check a subject file, with the overrules of the study file above it.
 
     Args:
-        path: the file, or a folder with one (`subject_file_in`).
+        path: the file.
         to_fit: require what only a fit needs: the sex, for the anthropometric tables.
 
     Raises:
@@ -105,8 +105,7 @@ def read_subject(path: str | Path, to_fit: bool = True) -> SubjectFile:
             mass); with the line.
     """
     path = Path(path).resolve()
-    if path.is_dir():
-        path = subject_file_in(path)
+    study = _of_study(path.parent)
     document = read_toml(path, "a subject file (subject.toml)")
     if "landmarks" in document.content:
         expected = "expected the subject file that names it (markers = ... under [model])"
@@ -129,7 +128,7 @@ def read_subject(path: str | Path, to_fit: bool = True) -> SubjectFile:
         index, problem = trouble
         words = {"name": Quantity(shown(result.trials[index].name)), "problem": Quantity(problem)}
         raise FileError.of(path, with_evidence("F192", Where(), words), document.line(("trial", index, "name")))
-    return result.model_copy(update={"diagnostics": _of_study(path.parent) + result.diagnostics})
+    return result.model_copy(update={"diagnostics": study + result.diagnostics})
 
 
 def _of_study(folder: Path) -> Diagnostics:
