@@ -71,7 +71,7 @@ def model_segments(
         height_m, sex: for lengths that the model's joints do not define (the torso's up to the neck, the foot's);
             sex also for L5/S1.
     """
-    pose = skeleton.pose(np.zeros((1, len(skeleton.coordinates))))
+    pose = skeleton.neutral
     place = {name: (pose.rotation[0, i], pose.translation[0, i]) for i, name in enumerate(skeleton.segments)}
     centres, main = _joint_centres(skeleton, place)
     if "lumbar" in centres and {"hip_r", "hip_l"} <= set(centres):

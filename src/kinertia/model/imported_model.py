@@ -169,7 +169,7 @@ class NeutralJoints:
 
 def neutral_joints(skeleton: Skeleton) -> NeutralJoints:
     """Locate the joints of a model whose coordinates are zero, except for those that are locked at another value."""
-    pose = skeleton.pose(np.zeros((1, len(skeleton.coordinates))))
+    pose = skeleton.neutral
     rotations = {name: pose.rotation[0, i] for i, name in enumerate(skeleton.segments)}
     origins = {name: pose.translation[0, i] for i, name in enumerate(skeleton.segments)}
     joints = {joint.child: joint for joint in skeleton.joints}

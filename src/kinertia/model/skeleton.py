@@ -286,6 +286,11 @@ class Skeleton:
         """Compute segment frames and axes at the coordinates q (n, c)."""
         return Pose(*poses(self.tree, np.ascontiguousarray(self.map.axes(q), dtype=float)), self.map.slopes(q))
 
+    @cached_property
+    def neutral(self) -> Pose:
+        """Pose (n = 1) where all coordinates are zero."""
+        return self.pose(np.zeros((1, len(self.coordinates))))
+
     def marker_positions(self, pose: Pose) -> np.ndarray:
         """Return model markers (n, m, 3) m in ground at this pose."""
         turned = pose.rotation[:, self.marker_segments] @ self.marker_locals[:, :, None]

@@ -121,7 +121,7 @@ def body_joints(skeleton: Skeleton) -> tuple[BodyJoint, ...]:
 
 def axes_alike(skeleton: Skeleton, joints: Sequence[BodyJoint]) -> bool:
     """Decide whether the joints' segments have axes forward, up and right where all coordinates are zero."""
-    rotation = skeleton.pose(np.zeros((1, len(skeleton.coordinates)))).rotation[0]
+    rotation = skeleton.neutral.rotation[0]
     rows = [[skeleton.segments.index(name) for name in (joint.parent, joint.child)] for joint in joints]
     turns = np.stack([rotation[parent].T @ rotation[child] for parent, child in rows])
     return bool(np.degrees(Rotation.from_matrix(turns).magnitude()).max() < _APART_DEG)
@@ -143,10 +143,11 @@ def joint_wrenches(
         joints: those to compute; `leg_joints` if None.
         pose: of this motion, where it is known already.
     """
-    chosen, pose = leg_joints(skeleton) if joints is None else joints, pose or skeleton.pose(motion.q)
+    chosen = leg_joints(skeleton) if joints is None else joints
     if not chosen:
         return {}
-    about, beyond = skeleton.root.centre(motion.q), [_beyond(skeleton, joint) for joint in chosen]
+    beyond, about = [_beyond(skeleton, joint) for joint in chosen], skeleton.root.centre(motion.q)
+    pose = pose or skeleton.pose(motion.q)
     needed = segment_loads(skeleton, bsp, motion)
     ground = np.concatenate([foot_loads[..., :3], foot_loads[..., 3:]], axis=-1).copy()
     ground[..., 3:] -= np.cross(about[:, None], ground[..., :3])
@@ -344,7 +345,7 @@ def joint_loads(
 
 def constraints(skeleton: Skeleton, joints: Sequence[BodyJoint]) -> np.ndarray:
     """Return the mask (j, 3) of components that the joints transmit by constraint."""
-    pose = skeleton.pose(np.zeros((1, len(skeleton.coordinates))))
+    pose = skeleton.neutral
     result = np.zeros((len(joints), 3), dtype=bool)
     for row, joint in enumerate(joints):
         parent, child = (skeleton.segments.index(segment) for segment in (joint.parent, joint.child))

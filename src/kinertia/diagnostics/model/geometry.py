@@ -221,5 +221,5 @@ def _nearest_m(place: np.ndarray, joints: Sequence[np.ndarray]) -> float:
 
 def _extent_m(skeleton: Skeleton) -> float:
     """Return the largest distance (m) between two bodies' origins with all coordinates at zero."""
-    places = skeleton.pose(np.zeros((1, len(skeleton.coordinates)))).translation[0]
+    places = skeleton.neutral.translation[0]
     return float(np.linalg.norm(places[:, None] - places[None], axis=-1).max())

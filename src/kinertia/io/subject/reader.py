@@ -105,7 +105,6 @@ def read_subject(path: str | Path, to_fit: bool = True) -> SubjectFile:
             mass); with the line.
     """
     path = Path(path).resolve()
-    study = _of_study(path.parent)
     document = read_toml(path, "a subject file (subject.toml)")
     if "landmarks" in document.content:
         expected = "expected the subject file that names it (markers = ... under [model])"
@@ -128,7 +127,7 @@ def read_subject(path: str | Path, to_fit: bool = True) -> SubjectFile:
         index, problem = trouble
         words = {"name": Quantity(shown(result.trials[index].name)), "problem": Quantity(problem)}
         raise FileError.of(path, with_evidence("F192", Where(), words), document.line(("trial", index, "name")))
-    return result.model_copy(update={"diagnostics": study + result.diagnostics})
+    return result.model_copy(update={"diagnostics": _of_study(path.parent) + result.diagnostics})
 
 
 def _of_study(folder: Path) -> Diagnostics:

@@ -158,7 +158,7 @@ def _derivatives(skeleton: Skeleton, joints: Sequence[BodyJoint], loads: np.ndar
 
 def _lengths_m(skeleton: Skeleton, joints: Sequence[BodyJoint]) -> dict[tuple[str, str], float]:
     """Return the distances of hips to knees and of knees to ankles, by the former and side."""
-    pose = skeleton.pose(np.zeros((1, len(skeleton.coordinates))))
+    pose = skeleton.neutral
     centres = {(joint.name, joint.side): joint.centre(skeleton, pose)[0] for joint in joints}
     return {
         (name, side): float(np.linalg.norm(place - centres[_NEXT[name], side]))
