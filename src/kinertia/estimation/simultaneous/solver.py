@@ -161,10 +161,7 @@ def _optimum(problem: MapProblem, progress: Callable[[float], None]) -> tuple[En
 
 
 def _left_out(problem: MapProblem, model: GaussNewton, static: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Apply `with_left_out` to an estimate of the static unknowns (S,).
-
-    It returns its change (S,), and a root (S, u) of what is added to its covariance.
-    """
+    """Return the change (S,) of static unknowns (S,) by `with_left_out`, a root (S, u) of the covariance added."""
     directions = problem.left_out(static)
     data = sum(eliminated.information for eliminated in model.displaced) @ directions
     pull = -directions.T @ problem.prior_slope(static)[0]
