@@ -36,7 +36,7 @@ from kinertia.model.marker_set import MarkerSet
 from kinertia.synthetic.walk import walking_subject
 from kinertia.trial.data import Markers
 from people import UNMOVED, with_model
-from results import context, error, walking
+from results import PartOfFit, context, error, walking
 
 
 def estimated_mass(total_kg):
@@ -160,16 +160,14 @@ def far_from_prior(distance, segments=1):
     prior = SimpleNamespace(table=lambda: expected)
     return [
         *soundness._far_parameters(
-            SimpleNamespace(estimate=body, expected=prior, posterior=posterior, more_known=True, file=None)
+            PartOfFit(estimate=body, expected=prior, posterior=posterior, more_known=True, file=None)
         )
     ][:1]
 
 
 def centre_off(distance_m):
     moved = SimpleNamespace(segments=("torso",), com_m=np.array([[distance_m, 0.0, 0.0]]))
-    fit = SimpleNamespace(
-        estimate=moved, literature=SimpleNamespace(com_m=np.zeros((1, 3))), more_known=True, file=None
-    )
+    fit = PartOfFit(estimate=moved, literature=SimpleNamespace(com_m=np.zeros((1, 3))), more_known=True, file=None)
     return soundness._far_centres(fit)
 
 

@@ -8,6 +8,7 @@ from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.registry import ESTIMATE_CHECKS
 from kinertia.diagnostics.runner import asked, explained
 from kinertia.estimation.prepared import TotalMass
+from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.simultaneous.instruments.instrument_errors import DELAY, CalibrationEntry
 from kinertia.estimation.simultaneous.instruments.priors import (
     GAIT27_UNCERTAINTY,
@@ -72,6 +73,13 @@ def context(*errors, ready=(), shown=None, prior=None, mass_kg=None, trials=None
     return made
 
 
+class PartOfFit(SimpleNamespace):
+    """What checks read of a `Fit`."""
+
+    departures = property(Fit.departures.func)
+    expected_source = Fit.expected_source
+
+
 def well_known(plates=("left",)):
     """Trials that show everything of these plates."""
     size = 5 * len(plates) + 4
@@ -94,7 +102,7 @@ def of_estimate(fitted, *names, literature=None):
     literature = literature or walking_subject().literature
     body = {"estimate": fitted.bsp, "literature": literature, "expected": literature, "more_known": False, "file": None}
     trials = [SimpleNamespace(name=name, kinematics=walking()) for name in names or ("walk",)]
-    fit = SimpleNamespace(
+    fit = PartOfFit(
         posterior=fitted.posterior,
         trials=trials,
         converged=fitted.result.converged,

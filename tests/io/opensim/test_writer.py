@@ -52,7 +52,6 @@ def old_text(text: bytes, changes) -> bytes:
     return text
 
 
-@pytest.mark.parametrize("name", SLOW_IF_LARGE)
 def write_osim(path, *args, **options):
     """Write the edited file, and return what changed."""
     content, changes = edited_osim(*args, **options)
@@ -60,6 +59,7 @@ def write_osim(path, *args, **options):
     return changes
 
 
+@pytest.mark.parametrize("name", SLOW_IF_LARGE)
 def test_only_mass_properties_change(opensim, file_of, tmp_path, name):
     source = file_of(name)
     ours = read_osim(source)
