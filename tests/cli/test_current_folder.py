@@ -12,7 +12,7 @@ from kinertia.cli.compiling import _beside
 from kinertia.cli.web.jobs import WORKER as PAGE_WORKER
 from kinertia.cohort.job import Job
 from kinertia.cohort.local import WORKER as COHORT_WORKER
-from kinertia.cohort.process import Process
+from kinertia.cohort.local import Process
 from kinertia.cohort.record import Place
 from kinertia.studies.parallel import in_parallel
 

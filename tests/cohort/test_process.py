@@ -2,7 +2,7 @@
 
 import sys
 
-from kinertia.cohort.process import Process
+from kinertia.cohort.local import Process
 
 
 def test_other_output_is_passed_over():

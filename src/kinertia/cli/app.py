@@ -1,4 +1,4 @@
-"""Defines `kinertia app`: check, fit and reports in the browser, on this computer only."""
+"""Defines `kinertia app`, the local page on this computer only, and `kinertia warm-up`, which compiles beforehand."""
 
 import webbrowser
 from collections.abc import Callable
@@ -8,9 +8,10 @@ from typing import Annotated
 
 import typer
 
-from kinertia.cli.common import out, print_json
+from kinertia.cli.common import Outcome, Quiet, out, print_json, shown_progress
 from kinertia.cli.demo import write_measured_lab, write_synthetic_lab
 from kinertia.errors import KinertiaError, how_to_install
+from kinertia.model.compiled import cache_folder, is_compiled
 
 _EXAMPLES: dict[str, Callable[[Path], object]] = {"measured": write_measured_lab, "synthetic": write_synthetic_lab}
 
@@ -60,3 +61,23 @@ def app(
             server.run()
     if not as_json:
         out.print("stopped; all finished results are in the library")
+
+
+def warm_up(quiet: Quiet = False) -> Outcome:
+    """Compile beforehand what the first fit would compile.
+
+    Kinertia's calculations are compiled once on a machine, which takes about
+    half a minute; any command that computes does it if necessary. The result is
+    kept beside the package or, where that cannot be written to, in your cache:
+    run this once as the owner of an installation that others may only read,
+    and on a cluster before the jobs start.
+
+    [bold]Example[/]
+
+    kinertia warm-up
+    """
+    done = is_compiled()
+    with shown_progress():
+        pass
+    out.print(f"{'compiled already' if done else 'compiled'}: {cache_folder()}", soft_wrap=True)
+    return Outcome({"compiled_before": done, "folder": str(cache_folder())})

@@ -86,7 +86,7 @@ _MORE = {
     "norms": "learning",
     "population": "learning",
     "study": "studies",
-    "warm-up": "warm_up",
+    "warm-up": "app",
 }
 """Module of every command, which has its name there (with underscores); in the order of `kinertia --help`."""
 RENAMED = {"--force": "--overwrite"}

@@ -13,8 +13,7 @@ from typing import Any
 from kinertia.cohort.people import Participant
 from kinertia.cohort.record import RECORD, Place, one_line
 from kinertia.errors import KinertiaError, SettingsError
-from kinertia.estimation.changes.change import Change
-from kinertia.estimation.changes.group_changes import GroupChange, group_changes
+from kinertia.estimation.changes.change import Change, GroupChange, group_changes
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.subject.provenance import sha256
 from kinertia.io.subject.reader import read_subject

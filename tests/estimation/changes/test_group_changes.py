@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from kinertia.estimation.changes.change import Change
-from kinertia.estimation.changes.group_changes import group_changes
+from kinertia.estimation.changes.change import Change, group_changes
 
 NAMED = ("moment", "knee", "adduction", "r", "mid-stance", "N m/kg")
 

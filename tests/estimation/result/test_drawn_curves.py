@@ -7,8 +7,7 @@ import pytest
 
 from kinertia.estimation.changes.stride_features import usual_sources
 from kinertia.estimation.result.curve_source import CurveSource
-from kinertia.estimation.result.drawn_curves import DrawnCurves
-from kinertia.estimation.result.drawn_fit import drawn_bodies, drawn_fit, drawn_joints
+from kinertia.estimation.result.drawn_fit import DrawnCurves, drawn_bodies, drawn_fit, drawn_joints
 
 NUMBERS = [0, 3, 4]
 

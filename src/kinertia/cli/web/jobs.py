@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from kinertia.cli.web.library import LOG, PersonFolder, started
-from kinertia.cohort.process import PYTHON, Process
+from kinertia.cohort.local import PYTHON, Process
 from kinertia.errors import internal_error
 from kinertia.model.compiled import is_compiled
 

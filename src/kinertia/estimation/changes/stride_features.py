@@ -14,8 +14,7 @@ import numpy as np
 
 from kinertia.estimation.result.curve_source import CurveSource, Estimated
 from kinertia.estimation.result.cycles import spread_evenly
-from kinertia.estimation.result.drawn_curves import AT_ONCE, DrawnCurves
-from kinertia.estimation.result.drawn_fit import drawn_bodies, drawn_joints, kept_draws
+from kinertia.estimation.result.drawn_fit import AT_ONCE, DrawnCurves, drawn_bodies, drawn_joints, kept_draws
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import PosteriorDraws

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinertia.estimation.result.drawn_curves import drawn_forces
+from kinertia.estimation.result.drawn_fit import drawn_forces
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.trial_fit import JointCurves, TrialFit
 from kinertia.motion.ground_reactions import GroundReactions

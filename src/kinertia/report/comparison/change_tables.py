@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.estimation.changes.change import MOST_WALKS, NOTABLE, PRIMARY, SOURCES, Change
+from kinertia.estimation.changes.change import MOST_WALKS, NOTABLE, PRIMARY, SOURCES, Change, GroupChange
 from kinertia.estimation.changes.curve_changes import CurveChange
-from kinertia.estimation.changes.group_changes import GroupChange
 from kinertia.report.figures.cycle_figures import band, mean_line
 from kinertia.report.figures.figure import (
     COMPARED,

@@ -13,10 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kinertia.errors import KinertiaError
-from kinertia.estimation.changes.change import Change, gait_changes, profile_changes, speed_change
+from kinertia.estimation.changes.change import Change, gait_changes, group_changes, profile_changes, speed_change
 from kinertia.estimation.changes.condition_changes import changes_of_strides, condition_features, masks_of
 from kinertia.estimation.changes.curve_changes import CurveChange, apart, curve_changes, paired, rows_of
-from kinertia.estimation.changes.group_changes import group_changes
 from kinertia.estimation.changes.session_changes import (
     Session,
     changes_between,
