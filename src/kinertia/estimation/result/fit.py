@@ -136,10 +136,9 @@ class Fit:
         part = replace(self, trials=tuple(self.trials[k] for k in kept))
         if "curves" in vars(self):
             names = {trial.name for trial in part.trials}
-            of_part = {
+            vars(part)["curves"] = {
                 stage: [curve for curve in curves if curve.trial in names] for stage, curves in self.curves.items()
             }
-            vars(part)["curves"] = of_part
         return part
 
     def cycles(self, stage: Stage = "estimate", norms: str | Path | None = None) -> pd.DataFrame:
