@@ -10,6 +10,7 @@ import pytest
 
 from chromium import DESKTOP, PATIENCE_MS, PHONE, Opened, colour, ink, playwright
 from found import FAULT_FREE, UNUSABLE
+from kinertia.estimation.result.mean_cycles import profiles_by_task
 from kinertia.io.norms_file import Norm
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.model_outputs import CLINICAL_ANGLES
@@ -403,7 +404,9 @@ def test_a_letter_with_norms_is_as_wide_as_the_paper(browser, fit, tmp_path):
     """The chart of gait scores was wider, so that the browser printed everything smaller."""
     norms = {name: Norm(np.array([0.0, 100.0]), np.zeros(2), np.ones(2)) for name in CLINICAL_ANGLES}
     path = tmp_path / "letter.html"
-    path.write_text(render(fit, norms=norms, template="letter"), encoding="utf-8")
+    path.write_text(
+        render(fit, norms=norms, profiles=profiles_by_task(fit, norms), template="letter"), encoding="utf-8"
+    )
     page = Opened(browser, path).page
     page.set_viewport_size({"width": PAPER_PX, "height": 900})
     page.emulate_media(media="print")
