@@ -14,7 +14,7 @@ from functools import cache
 from importlib import import_module
 from typing import Any
 
-from kinertia.cohort.local import PYTHON
+from kinertia.io.file_names import PYTHON
 from kinertia.model.compiled import SOURCES, is_compiled, is_stored, set_compiled
 
 _STAGE = "compiling, once"

@@ -17,9 +17,8 @@ from threading import Event, Thread
 from typing import Any, Self
 
 from kinertia.cohort.job import RETRIES, Finished, Job
+from kinertia.io.file_names import PYTHON
 
-PYTHON = (sys.executable, "-P")
-"""Python which imports nothing from the folder that it is started in: a file coverage.py there is somebody's data."""
 _OF_ITS_OWN: dict[str, Any] = {"process_group": 0}
 WORKER = (*PYTHON, "-m", "kinertia.cohort.worker")
 PERSON_MEMORY_BYTES = 2 * 1024**3

@@ -4,12 +4,16 @@ import os
 import re
 import shlex
 import subprocess
+import sys
 import unicodedata
 from collections.abc import Sequence
 from pathlib import Path
 
 _DEVICES = re.compile(r"(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³]) *", re.IGNORECASE)
 _FORBIDDEN = re.compile(r'[<>:"/\\|?*\x00-\x1f]|[ .]$')
+
+PYTHON = (sys.executable, "-P")
+"""Python which imports nothing from the folder that it is started in: a file coverage.py there is somebody's data."""
 RESULT_FILES = ("fit.json", "report.html", "bsp.csv", "model.osim", "model_changes.csv")
 """Result files beside the folders of several trials."""
 

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from kinertia.cli.web.library import LOG, PersonFolder, started
-from kinertia.cohort.local import PYTHON, Process
+from kinertia.cohort.local import Process
 from kinertia.errors import internal_error
+from kinertia.io.file_names import PYTHON
 from kinertia.model.compiled import is_compiled
 
 KINDS = ("check", "fit", "comparison")
