@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 
 from kinertia.estimation.changes.change import Change, named_outcome
 from kinertia.estimation.changes.session_changes import changes_between, session, session_features
-from kinertia.estimation.changes.stride_features import Rows, event_means
+from kinertia.estimation.changes.stride_features import Rows, stride_means
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.trial_fit import JointCurves, TrialFit
@@ -232,13 +232,12 @@ class _Instruments:
 
 def _truth(fit: Fit, exact: SyntheticTrial) -> dict[str, float]:
     """Return the true value of each outcome, at the phases of the day's strides."""
-    found = event_means([_exactly(trial, exact) for trial in fit.trials], fit.mass_kg)
-    names: dict[str, list[float]] = {}
-    for (_, name, side, _), value in found.items():
+    names = {}
+    for (name, side), values in stride_means([_exactly(trial, exact) for trial in fit.trials], fit.mass_kg).items():
         quantity, joint, event = name.split(" ", 2)
         quantity, joint, component = named_outcome(f"{quantity} {joint}")
-        names.setdefault(" ".join((quantity, joint, component, event, side)), []).append(value)
-    return {name: float(np.mean(values)) for name, values in names.items()}
+        names[" ".join((quantity, joint, component, event, side))] = float(np.mean(values))
+    return names
 
 
 @dataclass(frozen=True, eq=False)

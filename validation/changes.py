@@ -249,7 +249,7 @@ N m/kg or degrees. *Changed*: called so without a change, of all outcomes, witho
 A day with a single stride on plates shows no spread: *cannot be judged*, and not counted ({alone} of {pairs_of_days}
 pairs of days).
 
-The true value is that of the posture without differences between walks, at the true contacts of that posture. Contacts
+True values come from the posture itself, without what differs from walk to walk, and between true contacts. Contacts
 that no plate measured come from the motion; the deviations allow for 10 ms, by foot and kind of contact. Contacts that
 plates measured differ from walk to walk by up to 8 ms, since posture does.
 

@@ -126,7 +126,7 @@ _UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line with these arguments, or with those of this process."""
+    """Run the command line with `arguments`; by default those that this process was started with."""
     given = sys.argv[1:] if arguments is None else list(arguments)
     run(application_for(given), given)
 

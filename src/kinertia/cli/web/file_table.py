@@ -70,7 +70,7 @@ def _kind(file: Path, capture: bool, captures: Sequence[Path]) -> tuple[str, tup
         what = f"forces{of_static if STATIC_NAME.search(file.stem) else ''}"
         return what, (*((f"forces:{forces.name}", f"forces of {forces.name}") for forces in captures), unused)
     if holds_loads(file):
-        named = ((f"loads:{forces.name}", f"explains the forces of {forces.name}") for forces in captures)
+        named = ((f"loads:{forces.name}", f"external loads of {forces.name}") for forces in captures)
         return "meaning of the force columns (ExternalLoads)", (*named, unused)
     if suffix == ".osim":
         return "OpenSim model", (("osim", "model, in place of a static trial"), unused)

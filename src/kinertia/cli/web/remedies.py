@@ -111,7 +111,7 @@ def _proposed(person: PersonFolder) -> Iterator[Remedy]:
 
 
 def _write(person: PersonFolder, before: Content, after: Content) -> None:
-    """Write the entries, and remember those of a trial that is removed, as when the form leaves it out."""
+    """Write the entries; if a trial is removed, keep its entries for when it is added again, as the form does."""
     write(person, after)
     person.note(aside=put_aside(before, after, person.notes().get("aside", [])))
 

@@ -58,11 +58,8 @@ class ResultContext:
             return Where(trial=trial, plate=plate)
         known = [axes for name, axes in self._axes.items() if trial in (None, name)]
         named = [axes.named(_GROUND_AXES[axis]) for axes in known]
-        directions, columns = (
-            {axis_names["axis"] for axis_names in named},
-            {axis_names["file_axis"] for axis_names in named},
-        )
-        direction, column = (distinct.pop() if len(distinct) == 1 else None for distinct in (directions, columns))
+        distinct = ({names[key] for names in named} for key in ("axis", "file_axis"))
+        direction, column = (names.pop() if len(names) == 1 else None for names in distinct)
         return Where(trial=trial, plate=plate, axis=direction, file_axis=column)
 
 

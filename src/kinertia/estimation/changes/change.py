@@ -66,7 +66,7 @@ class NamedOutcome:
 
     @property
     def primary(self) -> bool:
-        """Whether the outcome was named beforehand."""
+        """Whether it is one of the outcomes that were chosen before any results were seen (`PRIMARY`)."""
         return (self.quantity, self.joint, self.component, self.event) in PRIMARY
 
 

@@ -30,9 +30,9 @@ from kinertia.estimation.changes.condition_changes import (
 from kinertia.estimation.changes.stride_features import (
     Rows,
     StrideFeatures,
-    event_means,
     only,
     stride_features,
+    stride_means,
     usual_sources,
 )
 from kinertia.estimation.result.drawn_fit import kept_draws
@@ -128,7 +128,7 @@ def unjudged_changes(
         same_sign: 1 or -1 for the angle (its coordinate without a side, and "r" or "l") that has the same or the
             opposite sign in both models; 0, and it is left out, where it is another angle.
     """
-    first, other = (_stride_means(visit) for visit in (before, after))
+    first, other = (stride_means(visit.trials, visit.fit.mass_kg) for visit in (before, after))
     for (outcome, side), values in first.items():
         if (later := other.get((outcome, side))) is not None:
             quantity, name, event = outcome.split(" ", 2)
@@ -148,14 +148,6 @@ def unjudged_changes(
                 np.nan,
                 doubt=doubt,
             )
-
-
-def _stride_means(visit: Session) -> dict[tuple[str, str], list[float]]:
-    """Return the means over each event of all strides, by outcome and side."""
-    found: dict[tuple[str, str], list[float]] = {}
-    for (_, outcome, side, _), value in event_means(visit.trials, visit.fit.mass_kg).items():
-        found.setdefault((outcome, side), []).append(value)
-    return found
 
 
 def session_features(

@@ -143,6 +143,14 @@ def event_means(trials: Sequence[Estimated], mass_kg: float) -> dict[Key, float]
     return {key: float(mean) for key, mean in zip(named, means, strict=True) if np.isfinite(mean)}
 
 
+def stride_means(trials: Sequence[Estimated], mass_kg: float) -> dict[tuple[str, str], list[float]]:
+    """Return `event_means` by name ("moment knee_adduction loading") and side, one for each stride."""
+    found: dict[tuple[str, str], list[float]] = {}
+    for (_, name, side, _), value in event_means(trials, mass_kg).items():
+        found.setdefault((name, side), []).append(value)
+    return found
+
+
 @dataclass(frozen=True, eq=False)
 class _Strides:
     """Strides of several trials, and the curves that they have.
@@ -266,7 +274,7 @@ def _curves_of(trials: Sequence[Estimated]) -> list[_Curves]:
 
 @dataclass(frozen=True, eq=False)
 class _Single:
-    """Curves of a trial as those of one draw."""
+    """The curves of a trial, arranged like `DrawnCurves` with a single draw."""
 
     source: CurveSource
 

@@ -144,7 +144,7 @@ def gait_profile(fit: Fit, norms: Mapping[str, Norm]) -> GaitProfile:
 def profiles_by_task(fit: Fit, norms: Mapping[str, Norm]) -> dict[str, GaitProfile]:
     """Compute the scores by task, in the order of `fits_by_task`; none where norms lack a variable.
 
-    Those of the main task are the fit's own.
+    The main task, which comes first, has the scores that `gait_profile` gives the whole fit.
 
     Raises:
         KinertiaError: as `gait_profile`.
