@@ -1,7 +1,7 @@
 """The mark `measured`: tests that need recordings which are no part of the repository.
 
-Four kinds have it: those that ask for a fixture of them, those with the name of such a file as a parameter, those
-marked by hand, and, where tests are chosen by it (`-m measured`), all that are collected only where the recordings are.
+Five kinds have it: those that ask for a fixture of them, those with the name of such a file as a parameter, those with
+`skipif` for want of them, those marked by hand, and, where tests are chosen by it (`-m measured`), all that are collected only where the recordings are.
 A test that is skipped for want of them fails unless it has the mark, so that what runs everywhere and what runs on
 measured recordings are all tests together.
 """
@@ -55,7 +55,8 @@ class MeasuredTests:
         for item in items:
             only_here = self.everywhere is not None and item.nodeid not in self.everywhere
             by_parameters = hasattr(item, "callspec") and any(map(of_recordings, item.callspec.params.values()))
-            if only_here or by_parameters or not self.fixtures.isdisjoint(item.fixturenames):
+            by_skipping = any(skip.kwargs.get("reason") == NEEDS_MEASURED for skip in item.iter_markers("skipif"))
+            if only_here or by_parameters or by_skipping or not self.fixtures.isdisjoint(item.fixturenames):
                 item.add_marker(MARK)
 
     @pytest.hookimpl(wrapper=True)
