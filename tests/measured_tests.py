@@ -1,7 +1,8 @@
 """The mark `measured`: tests that need recordings which are no part of the repository.
 
 Five kinds have it: those that ask for a fixture of them, those with the name of such a file as a parameter, those with
-`skipif` for want of them, those marked by hand, and, where tests are chosen by it (`-m measured`), all that are collected only where the recordings are.
+`skipif` for want of them, those marked by hand, and, where tests are chosen by it (`-m measured`), all that are
+collected only where the recordings are.
 A test that is skipped for want of them fails unless it has the mark, so that what runs everywhere and what runs on
 measured recordings are all tests together.
 """
