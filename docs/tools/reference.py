@@ -13,9 +13,9 @@ from typing import Any
 import typer
 
 from kinertia.cli.commands import application
-from kinertia.io.subject.tables import InstrumentsFiles, Model, PriorFiles, TrialFiles
+from kinertia.io.subject.tables import Diagnostics, InstrumentsFiles, Model, PriorFiles, TrialFiles
 from kinertia.model.marker_set import LANDMARKS, SEGMENTS, WIDTHS
-from kinertia.settings import Attached, Diagnostics, KnownSegment, Settings, Subject, Table
+from kinertia.settings import Attached, KnownSegment, Settings, Subject, Table
 
 DOCS = Path(__file__).resolve().parents[1]
 PAGES = tuple(DOCS / name for name in ("commands.md", "subject-file.md"))

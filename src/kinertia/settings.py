@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, model_validator
-
-from kinertia.findings.rule import all_rules, matching, rule
 
 
 def folder_of(info: ValidationInfo) -> Path:
@@ -183,6 +180,36 @@ class Subject(Table):
         return {"name": folder_of(info).name or "subject", **data} if isinstance(data, dict) else data
 
 
+@dataclass(frozen=True)
+class Method:
+    """What an estimator uses, besides trials of a person with the built-in model.
+
+    Attributes:
+        opensim_models: a model of the user's own, in place of the built-in one.
+        attached: objects that move with a segment.
+        priors: what is known of the body besides its mass, height and sex.
+        instruments: what is known of plates and synchronisation; otherwise they are exact.
+        joint_axes: joint axes, where the trials show them.
+        force_cutoff: a bandwidth of the forces in joint moments; otherwise it is the motion's.
+        symmetry: the setting by which left mirrors right.
+    """
+
+    opensim_models: bool = False
+    attached: bool = False
+    priors: bool = False
+    instruments: bool = False
+    joint_axes: bool = False
+    force_cutoff: bool = False
+    symmetry: bool = False
+
+
+MethodName = Literal["simultaneous", "two-level"]
+_METHODS: dict[MethodName, Method] = {
+    "simultaneous": Method(
+        opensim_models=True, attached=True, priors=True, instruments=True, joint_axes=True, force_cutoff=True
+    ),
+    "two-level": Method(symmetry=True),
+}
 SignConvention = Literal["clinical", "isb", "opensim"]
 
 
@@ -194,7 +221,7 @@ class Settings(Table):
         'simultaneous'
     """
 
-    method: Literal["simultaneous", "two-level"] = Field(
+    method: MethodName = Field(
         default="simultaneous", description='estimator: "simultaneous" or "two-level" (the study\'s)'
     )
     bsp: Literal["dumas", "deleva"] = Field(
@@ -221,6 +248,11 @@ class Settings(Table):
         description='signs in the report: "clinical", "isb" or "opensim"; left out: "opensim" for an OpenSim model, '
         'else "clinical"',
     )
+
+    @property
+    def uses(self) -> Method:
+        """What the method uses."""
+        return _METHODS[self.method]
 
 
 class Instruments(Table):
@@ -352,49 +384,3 @@ class Overrule:
     def reason(self, code: str) -> str:
         """Return the last reason given for this code, its question or its family; empty without."""
         return next((why for given, why in reversed(self.reasons) if code.startswith(given)), "")
-
-
-def _codes(value: object) -> tuple[str, ...]:
-    if not isinstance(value, list | tuple) or not all(isinstance(code, str) for code in value):
-        raise ValueError('must be a list of codes, questions or families in quotes, like ["M102", "R40"]')
-    for code in value:
-        if not matching(code):
-            written = code[:1].upper() + code[1:].upper().replace("O", "0")
-            near = get_close_matches(written, all_rules(), n=3, cutoff=0.5)
-            hint = f"the nearest are {', '.join(near)}" if near else "see kinertia explain"
-            raise ValueError(f"'{code}' is not a code, question or family; {hint}")
-    return tuple(value)
-
-
-def _waivable(value: object) -> tuple[str, ...]:
-    codes = _codes(value)
-    if hard := [code for code in codes if code in all_rules() and rule(code).hard]:
-        raise ValueError(f"'{hard[0]}' cannot be waived, since nothing can be computed with it")
-    return codes
-
-
-class Diagnostics(Table):
-    """Findings that are overruled for a study, for one person or for one trial.
-
-    Examples:
-        >>> kinertia.settings.Diagnostics(waive=["P244"], ignore=["M102", "R40"]).overrule
-        Overrule(waive=('P244',), ignore=('M102', 'R40'), reasons=())
-    """
-
-    ignore: Annotated[tuple[str, ...], BeforeValidator(_codes)] = Field(
-        default=(),
-        description='findings below ERROR that are hidden and do not lower the verdict, like ["M102", "R40"]',
-    )
-    waive: Annotated[tuple[str, ...], BeforeValidator(_waivable)] = Field(
-        default=(), description='ERRORs that do not stop an estimate and are shown as waived, like ["P244"]'
-    )
-    reasons: dict[str, str] = Field(default={}, description='why, by code: `{ P244 = "plates were moved" }`')
-
-    @property
-    def overrule(self) -> Overrule:
-        """The codes to waive and to ignore, in the form that findings take."""
-        return Overrule(self.waive, self.ignore, tuple(self.reasons.items()))
-
-    def __add__(self, other: Diagnostics) -> Diagnostics:
-        ignore, waive = (*self.ignore, *other.ignore), (*self.waive, *other.waive)
-        return Diagnostics(ignore=ignore, waive=waive, reasons=self.reasons | other.reasons)

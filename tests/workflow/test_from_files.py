@@ -3,6 +3,7 @@ import pytest
 from kinertia.errors import SettingsError
 from kinertia.io.subject.person_recordings import read_inputs
 from kinertia.io.subject.reader import read_subject, with_settings
+from kinertia.io.subject.tables import InstrumentsFiles
 from kinertia.settings import KnownSegment
 from kinertia.workflow.from_files import prepare_subject
 from kinertia.workflow.person import read_person
@@ -52,5 +53,12 @@ def test_a_prosthesis_is_no_mirror_image(c3d_lab):
     with pytest.raises(SettingsError, match=r"shank_l: a prosthesis does not mirror .* symmetry = false"):
         prepare_subject(with_settings(wanted, method="two-level"))
     two_level = prepare_subject(with_settings(wanted, method="two-level", symmetry=False))
-    (unused,) = [finding for finding in two_level.findings if finding.code == "F194"]
-    assert "[segment]" in unused.evidence["entry"].value
+    assert unused_entries(two_level) == ["[prior] and [segment]"]
+    stated = wanted.model_copy(update={"instruments": InstrumentsFiles(plate_sd_mm=2.0, zeroed=True)})
+    two_level = prepare_subject(with_settings(stated, method="two-level", symmetry=False))
+    assert unused_entries(two_level) == ["[prior] and [segment]", "[instruments]"]
+    assert not unused_entries(prepare_subject(stated))
+
+
+def unused_entries(ready):
+    return [finding.evidence["entry"].value for finding in ready.findings if finding.code == "F194"]

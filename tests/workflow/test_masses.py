@@ -17,6 +17,7 @@ from kinertia.estimation.simultaneous.observation import observe
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.findings.finding import Severity, finding
 from kinertia.findings.quantity import Quantity, Where
+from kinertia.io.opensim.reader import read_osim
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import inverse_dynamics, residual
 from kinertia.settings import Attached, KnownSegment, PriorSettings, Settings, Subject
@@ -232,12 +233,21 @@ def test_things_that_weigh_more_than_the_scale_said_are_an_error():
     assert "F191" not in str(caught.value)
 
 
-def test_two_level_refuses():
+def test_two_level_refuses_what_it_would_ignore(synthetic_lab):
     subject = walking_subject()
     person = Subject(name="A", mass_kg=MASS_KG, height_m=1.8, sex="male")
     settings = Settings(method="two-level")
-    with pytest.raises(SettingsError, match="the two-level method estimates the body only"):
-        prepare(person, subject.static, [], settings, attached=[Attached(mass_kg=1.0, **PACK)])
+    model = read_osim(synthetic_lab / "scaled.osim")
+    for unused, source, given in (
+        ("[[attached]]", subject.static, {"attached": [Attached(mass_kg=1.0, **PACK)]}),
+        ("priors", subject.static, {"prior": literature_prior(subject.bsp)}),
+        ("OpenSim models", model, {}),
+    ):
+        with pytest.raises(SettingsError) as caught:
+            prepare(person, source, [], settings, **given)
+        evidence = caught.value.finding.evidence
+        assert evidence["entry"].value == "method"
+        assert unused in evidence["expected"].value
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ import shutil
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 import pandas as pd
@@ -30,12 +30,12 @@ from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.report.exports.contents import summary
 from kinertia.report.exports.files import save_fit
 from kinertia.report.pages.truth_comparison import Truth
+from kinertia.settings import MethodName
 from kinertia.synthetic.laboratory import LabNoise, record, write_lab
 from kinertia.synthetic.walk import SyntheticTrial, unlike_literature, walk, walking_subject
 from kinertia.workflow.estimate import estimate_bsp
 from kinertia.workflow.from_files import fit_subject
 
-Method = Literal["simultaneous", "two-level"]
 _SHOWN_JOINTS = ("hip flexion", "hip adduction", "knee", "ankle", "lumbar extension")
 """Joints on the terminal; `report.html` has all."""
 PLATE_RATE_HZ, SAMPLES_PER_FRAME = 1000.0, 10
@@ -130,7 +130,7 @@ def run_demo(
     seed: int = 1,
     noise: LabNoise = LABORATORY,
     progress: Progress = lambda stage, share: None,
-    method: Literal["simultaneous", "two-level"] = "simultaneous",
+    method: MethodName = "simultaneous",
 ) -> Demo:
     """Make the laboratory's files in `folder`/lab, estimate from them, write results and `bsp_truth.csv` into `folder`.
 
@@ -163,7 +163,7 @@ def demo(
     measured: Annotated[
         bool, typer.Option("--measured", help="Fit a measured walk instead (downloaded once).")
     ] = False,
-    method: Annotated[Method, typer.Option(help="Estimator.")] = "simultaneous",
+    method: Annotated[MethodName, typer.Option(help="Estimator.")] = "simultaneous",
     output: Output = Path("out"),
     overwrite: Overwrite = False,
     quiet: Quiet = False,

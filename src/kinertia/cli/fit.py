@@ -46,13 +46,13 @@ from kinertia.io.subject.reader import read_subject, subject_file_in, subject_fr
 from kinertia.io.subject.tables import SubjectFile
 from kinertia.report.exports.contents import FitContent, content_of
 from kinertia.report.exports.files import FIT_FILES, TRIAL_FILES, write_content
-from kinertia.settings import Overrule, Settings
+from kinertia.settings import MethodName, Overrule
 from kinertia.workflow.from_files import fit_subject
 
 
 def _methods(typed: str) -> list[str]:
     """Return completions that the shell offers for --method."""
-    return [name for name in get_args(Settings.model_fields["method"].annotation) if name.startswith(typed)]
+    return [name for name in get_args(MethodName) if name.startswith(typed)]
 
 
 def fit(

@@ -252,7 +252,7 @@ def _free_axes(trials: Sequence[RotatedTrial], landmarks: _Landmarks, settings: 
         return settings.joint_axes
     if landmarks.of_walk or any(not trial.trial.loads.plates for trial in trials):
         return True
-    return None if settings.method == "simultaneous" else False
+    return None if settings.uses.joint_axes else False
 
 
 def _show_axes(landmarks: _Landmarks, trials: Sequence[RotatedTrial], calibrated: Calibrated) -> bool:

@@ -95,12 +95,7 @@ def estimate(
         KinertiaError: the trials contradict each other, or the scale.
     """
     settings, started = ready.settings, time.perf_counter()
-    if settings.method == "two-level":
-        if terms:
-            raise SettingsError.of_entry("method", 'expected "simultaneous": only this estimate has cost terms')
-        outcome = _two_level(ready, settings, started, progress)
-    else:
-        outcome = _simultaneous(ready, settings, started, progress, terms)
+    outcome = _ESTIMATORS[settings.method](ready, settings, started, progress, terms)
     fit = Fit(
         subject=ready.subject,
         settings=settings,
@@ -133,7 +128,11 @@ class _Outcome:
     evaluations: int = 0
 
 
-def _two_level(ready: Prepared, settings: Settings, started: float, progress: Progress) -> _Outcome:
+def _two_level(
+    ready: Prepared, settings: Settings, started: float, progress: Progress, terms: Sequence[type[CostTerm]]
+) -> _Outcome:
+    if terms:
+        raise SettingsError.of_entry("method", 'expected "simultaneous": only this estimate has cost terms')
     for k in ready.kinematics:
         if not k.complete:
             problem = f'expected "simultaneous": in {k.trial.name}, all ground contact is never measured together'
@@ -210,6 +209,9 @@ def _simultaneous(
     ]
     trials = _trial_fits(ready, fitted.bsp, estimates, started)
     return _Outcome(fitted.skeleton, fitted.bsp, trials, result.converged, fitted.posterior)
+
+
+_ESTIMATORS = {"simultaneous": _simultaneous, "two-level": _two_level}
 
 
 @dataclass(frozen=True, eq=False)

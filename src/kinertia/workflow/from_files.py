@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from kinertia.errors import PriorError, SessionError, SettingsError
 from kinertia.estimation.prepared import Prepared, Progress
 from kinertia.estimation.result.fit import Fit
-from kinertia.findings.finding import finding
+from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.io.file_names import command_line
 from kinertia.io.subject.provenance import recordings
@@ -50,31 +50,48 @@ def prepare_subject(
         KinertiaError: a file is missing or broken, or something in it cannot be used.
     """
     wanted = subject if isinstance(subject, SubjectFile) else read_subject(subject)
-    known = wanted.instruments
-    _expect_no_mirrored_prosthesis(wanted)
+    wanted, unused = _used(wanted)
     session = _session(wanted)
     measures = _measures(wanted)
     screened = screen(read_person(wanted, progress).with_overrule(overrule or Overrule()))
     body = _known_body(wanted, measures)
     ready = prepared(screened, wanted.settings, progress, known=body)
-    if wanted.settings.method == "two-level" and not _only_tables(wanted):
-        ready = _with_unused(ready, "[prior] and [segment]")
-    if known.model_copy(update={"date": None, "zeroed": False, "plates": None}) == InstrumentsFiles():
+    ready = replace(ready, findings=(*ready.findings, *unused))
+    if wanted.instruments == _only_recordings(wanted.instruments):
         return ready
-    if wanted.settings.method == "two-level":
-        return _with_unused(ready, "[instruments]")
     from kinertia.workflow.session import with_instruments
 
-    return with_instruments(ready, known, session, recordings(wanted))
+    return with_instruments(ready, wanted.instruments, session, recordings(wanted))
 
 
-def _expect_no_mirrored_prosthesis(wanted: SubjectFile) -> None:
-    names = [name for name, segment in wanted.segments.items() if segment.prosthesis]
-    if names and wanted.settings.method == "two-level" and wanted.settings.symmetry:
+def _used(wanted: SubjectFile) -> tuple[SubjectFile, list[Finding]]:
+    """Return the subject file without entries that its method does not use, and a finding for each that it has.
+
+    Raises:
+        SettingsError: a prosthesis is to mirror the other side.
+    """
+    settings = wanted.settings
+    prostheses = [name for name, segment in wanted.segments.items() if segment.prosthesis]
+    if prostheses and settings.uses.symmetry and settings.symmetry:
         raise SettingsError.of_entry(
-            ", ".join(names),
+            ", ".join(prostheses),
             "a prosthesis does not mirror the other side; use the default method, or symmetry = false",
         )
+    without: dict[str, dict[str, Any]] = {}
+    if not settings.uses.priors:
+        without["[prior] and [segment]"] = {"prior": PriorFiles(), "segments": {}}
+    if not settings.uses.instruments:
+        without["[instruments]"] = {"instruments": _only_recordings(wanted.instruments)}
+    used, unused = wanted, []
+    for entry, values in without.items():
+        before, used = used, used.model_copy(update=values)
+        unused += [] if used == before else [finding("F194", entry=Quantity(entry))]
+    return used, unused
+
+
+def _only_recordings(instruments: InstrumentsFiles) -> InstrumentsFiles:
+    """Return what concerns the recordings, and nothing of the errors of instruments."""
+    return InstrumentsFiles(date=instruments.date, zeroed=instruments.zeroed, plates=instruments.plates)
 
 
 def _session(wanted: SubjectFile) -> tuple[PersonInstruments, ...]:
@@ -100,14 +117,9 @@ def _measures(wanted: SubjectFile) -> BodyMeasures | None:
     return read_measures(wanted.prior.measures)
 
 
-def _only_tables(wanted: SubjectFile) -> bool:
-    """Return whether nothing is known of the body besides mass, height and sex."""
-    return wanted.prior == PriorFiles() and not wanted.segments
-
-
 def _known_body(wanted: SubjectFile, measures: BodyMeasures | None) -> KnownBody | None:
-    """Return what is known of the body besides mass, height and sex, for a method that uses it; None if nothing."""
-    if _only_tables(wanted) or wanted.settings.method == "two-level":
+    """Return what is known of the body besides mass, height and sex; None if nothing."""
+    if wanted.prior == PriorFiles() and not wanted.segments:
         return None
     from kinertia.io.subject.body_files import read_bsp
     from kinertia.workflow.known_body import KnownBody
@@ -115,11 +127,6 @@ def _known_body(wanted: SubjectFile, measures: BodyMeasures | None) -> KnownBody
     earlier = None if wanted.prior.bsp is None else read_bsp(wanted.prior.bsp)
     group = None if wanted.prior.population is None else _group(wanted, wanted.prior.population)
     return KnownBody(wanted.prior, earlier, wanted.segments, group, measures)
-
-
-def _with_unused(ready: Prepared, entry: str) -> Prepared:
-    """Add a finding for an entry of the subject file that has no effect."""
-    return replace(ready, findings=(*ready.findings, finding("F194", entry=Quantity(entry))))
 
 
 def _group(wanted: SubjectFile, path: Path) -> LearntPrior:

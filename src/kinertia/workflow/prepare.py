@@ -80,13 +80,10 @@ def prepared(
 
     Raises:
         BlockedError: findings leave no trial, with all of them.
-        KinertiaError: the subject cannot be used, or what is known of the body.
+        KinertiaError: the subject cannot be used, what is known of the body, or what the method does not use.
     """
     person = screened.person
-    if person.attached and settings.method == "two-level":
-        raise SettingsError.of_entry(
-            "method", "the two-level method estimates the body only; with [[attached]] use the default"
-        )
+    _expect_used(settings, person, prior)
     check_trials(person.recordings)
     usable = screened.usable
     progress("calibration", 0.0)
@@ -123,6 +120,18 @@ def prepared(
     ready, by_itself = (ready, ()) if known is None else known.leaned_on(ready)
     ready = with_attached(ready, by_itself)
     return ready if known is None else known.measured_on(ready)
+
+
+def _expect_used(settings: Settings, person: Person, prior: BspPrior | None) -> None:
+    """Raise a SettingsError for what is given of a person and not used by the method."""
+    unused = {
+        "OpenSim models": person.model is not None and not settings.uses.opensim_models,
+        "[[attached]]": bool(person.attached) and not settings.uses.attached,
+        "priors": prior is not None and not settings.uses.priors,
+    }
+    if given := [name for name, is_given in unused.items() if is_given]:
+        problem = f"{settings.method} does not use {' or '.join(given)}; use the default method"
+        raise SettingsError.of_entry("method", problem)
 
 
 def _model(screened: Screened, trials: Sequence[RotatedTrial], settings: Settings) -> PersonModel:

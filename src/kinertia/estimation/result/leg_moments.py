@@ -91,7 +91,7 @@ def forces_used(reactions: GroundReactions, settings: Settings, motion_hz: float
 
 def forces_before(reactions: GroundReactions, settings: Settings) -> str:
     """Describe the ground reactions of the joint moments before the estimate, which include impact transients."""
-    by_user = settings.method == "simultaneous" and not isinstance(settings.force_cutoff_hz, str)
+    by_user = settings.uses.force_cutoff and not isinstance(settings.force_cutoff_hz, str)
     return "as measured" if by_user else _bandwidth(reactions, settings).which
 
 
@@ -106,7 +106,7 @@ def _bandwidth(reactions: GroundReactions, settings: Settings) -> ForcesUsed:
     if reactions.cutoff_hz is None:
         return ForcesUsed("as measured", "")
     which = f"low-passed at {reactions.cutoff_hz:.3g} Hz"
-    if settings.method == "two-level":
+    if not settings.uses.force_cutoff:
         return ForcesUsed(which, ", the bandwidth of the motion")
     if isinstance(settings.force_cutoff_hz, str):
         return ForcesUsed(which, ", because the plates are noisy when unloaded")

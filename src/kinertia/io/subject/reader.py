@@ -58,11 +58,11 @@ from kinertia.errors import FileError, SettingsError, SubjectError, wrong_entry
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.file_names import command_line, trouble_as_folders
-from kinertia.io.subject.tables import TABLES, CodedError, StudyFile, SubjectFile, shown
+from kinertia.io.subject.tables import TABLES, CodedError, Diagnostics, StudyFile, SubjectFile, shown
 from kinertia.io.text.number_table import number_of
 from kinertia.io.text.toml_lines import Location, TomlFile, read_toml
 from kinertia.model.anthropometry import check_subject
-from kinertia.settings import Diagnostics, Settings, Table
+from kinertia.settings import Settings, Table
 
 T = TypeVar("T", bound=Table)
 STUDY_FILE = "kinertia.toml"
@@ -181,9 +181,9 @@ def _incomplete(wanted: SubjectFile, needs_sex: bool = True) -> tuple[Location, 
     if all(trial.use == "kinematics" for trial in wanted.trials):
         known = {"key": Quantity("use"), "value": Quantity(shown("kinematics"))}
         return ("trial", 0, "use"), wrong_entry(f"use = {shown('kinematics')}", _FORCES_NEEDED, known)
-    if model.osim is not None and wanted.settings.method == "two-level":
-        two_level = 'method = "two-level" (which works on the built-in model only)'
-        return ("settings", "method"), _conflict(two_level, "osim in [model]")
+    if model.osim is not None and not wanted.settings.uses.opensim_models:
+        method = f"method = {shown(wanted.settings.method)} (which works on the built-in model only)"
+        return ("settings", "method"), _conflict(method, "osim in [model]")
     return None
 
 

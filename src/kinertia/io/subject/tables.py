@@ -4,6 +4,7 @@ import datetime
 import json
 import os
 from collections.abc import Mapping
+from difflib import get_close_matches
 from pathlib import Path, PureWindowsPath
 from typing import Annotated, Any, Literal
 
@@ -13,14 +14,15 @@ from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 from kinertia.errors import missing_file
 from kinertia.findings.finding import Severity, with_evidence
 from kinertia.findings.quantity import Quantity, Where
+from kinertia.findings.rule import all_rules, matching, rule
 from kinertia.io.file_names import path_from
 from kinertia.io.marker_set_file import preset_names
 from kinertia.io.text.toml_lines import quoted
 from kinertia.settings import (
     Attached,
-    Diagnostics,
     Instruments,
     KnownSegment,
+    Overrule,
     PriorSettings,
     Settings,
     Subject,
@@ -118,6 +120,53 @@ BeltSpeed = Annotated[float | tuple[float, float] | Path, BeforeValidator(_belt_
 def shown(value: object) -> str:
     """Format a value nearly as TOML does."""
     return json.dumps(value, default=str, ensure_ascii=False)
+
+
+def _codes(value: object) -> tuple[str, ...]:
+    if not isinstance(value, list | tuple) or not all(isinstance(code, str) for code in value):
+        raise ValueError('must be a list of codes, questions or families in quotes, like ["M102", "R40"]')
+    for code in value:
+        if not matching(code):
+            written = code[:1].upper() + code[1:].upper().replace("O", "0")
+            near = get_close_matches(written, all_rules(), n=3, cutoff=0.5)
+            hint = f"the nearest are {', '.join(near)}" if near else "see kinertia explain"
+            raise ValueError(f"'{code}' is not a code, question or family; {hint}")
+    return tuple(value)
+
+
+def _waivable(value: object) -> tuple[str, ...]:
+    codes = _codes(value)
+    if hard := [code for code in codes if code in all_rules() and rule(code).hard]:
+        raise ValueError(f"'{hard[0]}' cannot be waived, since nothing can be computed with it")
+    return codes
+
+
+class Diagnostics(Table):
+    """Findings that are overruled for a study, for one person or for one trial.
+
+    Examples:
+        >>> from kinertia.io.subject.tables import Diagnostics
+        >>> Diagnostics(waive=["P244"], ignore=["M102", "R40"]).overrule
+        Overrule(waive=('P244',), ignore=('M102', 'R40'), reasons=())
+    """
+
+    ignore: Annotated[tuple[str, ...], BeforeValidator(_codes)] = Field(
+        default=(),
+        description='findings below ERROR that are hidden and do not lower the verdict, like ["M102", "R40"]',
+    )
+    waive: Annotated[tuple[str, ...], BeforeValidator(_waivable)] = Field(
+        default=(), description='ERRORs that do not stop an estimate and are shown as waived, like ["P244"]'
+    )
+    reasons: dict[str, str] = Field(default={}, description='why, by code: `{ P244 = "plates were moved" }`')
+
+    @property
+    def overrule(self) -> Overrule:
+        """The codes to waive and to ignore, in the form that findings take."""
+        return Overrule(self.waive, self.ignore, tuple(self.reasons.items()))
+
+    def __add__(self, other: "Diagnostics") -> "Diagnostics":
+        ignore, waive = (*self.ignore, *other.ignore), (*self.waive, *other.waive)
+        return Diagnostics(ignore=ignore, waive=waive, reasons=self.reasons | other.reasons)
 
 
 class Model(Table):
