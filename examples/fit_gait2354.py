@@ -39,7 +39,9 @@ def main(folder: Path, window_s: tuple[float, float] | None = None) -> kinertia.
 
     # 3. Prepare: joint centres and axes from the static trial, inverse kinematics, smoothing, the literature's BSPs.
     subject = kinertia.Subject(name="subject01", sex="male", mass_kg=72.6, height_m=1.803)
-    ready = kinertia.prepare(subject, static, [kinertia.TrialInput(walk, window_s)], marker_set=marker_set)
+    ready = kinertia.prepare(
+        kinertia.Person(subject, [kinertia.TrialInput(walk, window_s)], static, marker_set=marker_set)
+    )
     (kinematics,) = ready.kinematics
     print(
         f"{len(ready.skeleton.coordinates)} coordinates, {len(ready.skeleton.segments)} segments",

@@ -28,6 +28,7 @@ from kinertia.synthetic.laboratory import LabNoise
 from kinertia.trial.data import Recording
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.estimate import estimate_bsp
+from kinertia.workflow.person import Person
 from made_codes import MadeCodes
 from measured_tests import EMPTY, MeasuredTests
 from once import once
@@ -311,7 +312,7 @@ def short_fit(tmp_path_factory, recording_of):
             for name, window in (("early", (1.2, 1.5)), ("late", (1.7, 2.0)))
         ]
         with mock.patch(LIMITS[0], FEW_EVALUATIONS), mock.patch(LIMITS[1], FEW_EVALUATIONS):
-            return estimate_bsp(Subject(name="A", sex="male"), static, inputs, Settings(method="two-level"))
+            return estimate_bsp(Person(Subject(name="A", sex="male"), inputs, static), Settings(method="two-level"))
 
     return once(tmp_path_factory, "short-fit", make)
 

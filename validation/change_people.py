@@ -33,6 +33,7 @@ from kinertia.trial.data import LOAD_THRESHOLD_N, Markers
 from kinertia.trial.sampled_data import runs
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.estimate import estimate
+from kinertia.workflow.person import Person as Recorded
 from kinertia.workflow.prepare import prepare
 
 MARKER_SD_M, SEGMENT_SD_M = 0.005, 0.005
@@ -139,7 +140,7 @@ def day(subject: SyntheticSubject, manner: Manner, name: str, rng: np.random.Gen
         exact = Markers(lab.walk.markers.time, placed.labels, placed.marker_positions(placed.pose(q)))
         markers = camera_noise(skins.moved(exact, trial, q), CAMERA_SD_M, rng)
         inputs.append(TrialInput(replace(lab.walk, name=f"{name} walk {number}", markers=markers), condition=name))
-    ready = prepare(Subject(name="synthetic", sex="male"), standing, inputs, Settings(joint_axes=True))
+    ready = prepare(Recorded(Subject(name="synthetic", sex="male"), inputs, standing), Settings(joint_axes=True))
     fit = estimate(with_markers_anew(ready))
     return Day(fit, _truth(fit, walk(subject, WALK_S, PLATES_HZ, manner=manner)))
 

@@ -21,6 +21,7 @@ from kinertia.synthetic.walk import Manner, SyntheticSubject, SyntheticTrial, wa
 from kinertia.trial.data import Markers, Recording
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.estimate import estimate
+from kinertia.workflow.person import Person
 from kinertia.workflow.prepare import prepare
 from validation.joint_accuracy import WITHIN
 from validation.measured_trials import table
@@ -146,7 +147,9 @@ def measured(case: Case, seed: int) -> Measured:
     """Fit the person of this seed, and compare with the truth."""
     recorded = session(case, seed)
     started = time.perf_counter()
-    fit = estimate(prepare(Subject(sex="male"), recorded.static, recorded.inputs, Settings(joint_axes=case.joint_axes)))
+    fit = estimate(
+        prepare(Person(Subject(sex="male"), recorded.inputs, recorded.static), Settings(joint_axes=case.joint_axes))
+    )
     return _compared(fit, recorded, time.perf_counter() - started)
 
 

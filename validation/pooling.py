@@ -8,6 +8,7 @@ from kinertia.io.recording import read_recording
 from kinertia.settings import Settings, Subject
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.estimate import estimate_bsp
+from kinertia.workflow.person import Person
 from validation.measured_data import data_folder
 from validation.measured_trials import table
 
@@ -23,7 +24,7 @@ def pooled() -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     settings = Settings(method="simultaneous")
     halves = [TrialInput(replace(walked, name=n), w) for n, w in (("first", (0.0, 1.25)), ("second", (1.25, 2.5)))]
     inputs = {"whole": [TrialInput(walked)], "first half": halves[:1], "second half": halves[1:], "halves": halves}
-    fits = {name: estimate_bsp(subject, static, trials, settings).bsp for name, trials in inputs.items()}
+    fits = {name: estimate_bsp(Person(subject, trials, static), settings).bsp for name, trials in inputs.items()}
     return (
         {name: bsp["estimate"].to_numpy() for name, bsp in fits.items()},
         {name: bsp["sd"].to_numpy() for name, bsp in fits.items()},

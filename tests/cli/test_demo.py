@@ -20,6 +20,7 @@ from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.report.pages.page import render
 from kinertia.synthetic.walk import unlike_literature, walking_subject
 from kinertia.workflow.from_files import prepare_subject
+from kinertia.workflow.person import Person
 from kinertia.workflow.prepare import prepare
 from report_page import Elements, figures_of, numbers
 
@@ -96,7 +97,7 @@ def test_same_seed_same_files(tmp_path, demo_run, monkeypatch):
         measured.setdefault(seed, (folder / "walk.trc").read_text())
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(demo_module, "read_inputs", stop)
+    monkeypatch.setattr(demo_module, "fit_subject", stop)
     for seed in (1, 2):
         with pytest.raises(KeyboardInterrupt):
             demo_module.run_demo(tmp_path / "out", seed)
@@ -108,7 +109,7 @@ def test_files_hold_nothing_of_the_truth(demo_run):
     result, _ = demo_run
     wanted = read_subject(result.subject_file)
     static, inputs, marker_set = read_inputs(wanted)
-    ready = prepare(wanted.subject, static, inputs, wanted.settings, marker_set)
+    ready = prepare(Person(wanted.subject, inputs, static, marker_set=marker_set), wanted.settings)
     np.testing.assert_array_equal(ready.literature.table(), result.fit.literature.table())
     off = np.abs(ready.literature.com_m - result.truth.com_m)
     assert np.median(off) > 0.003

@@ -13,6 +13,7 @@ from kinertia.trial.sampled_data import nearest_samples, span_s
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.check import check_recording
 from kinertia.workflow.estimate import estimate_bsp
+from kinertia.workflow.person import Person
 from recordings import QUICK_WALKS, WALKS, marker_set_for, named_here, slow_beside
 
 SUBJECT4 = ("subject4/walking1.trc", "subject4/walking1_grf.mot")
@@ -87,7 +88,7 @@ def test_the_same_estimate(file_of, recording_of, name):
     model_file, *files = OF_MODELS[name]
     model, walk = read_osim(file_of(model_file)), recording_of(*files)
     first, *others = (
-        estimate_bsp(Subject(mass_kg=MASS_KG[name]), model, [TrialInput(recording)])
+        estimate_bsp(Person(Subject(mass_kg=MASS_KG[name]), [TrialInput(recording)], model=model))
         for recording in (walk, later(walk, 5.0), later(walk, 10.0))
     )
     loads, sd = first.trials[0].joint_loads["estimate"], first.trials[0].deviations.moments

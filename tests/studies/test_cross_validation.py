@@ -12,6 +12,7 @@ from kinertia.studies.cross_validation import cross_validate, frozen
 from kinertia.synthetic.laboratory import PERFECT, LabNoise, record, write_lab
 from kinertia.synthetic.walk import HEIGHT_M, MASS_KG, SEX, walk, walking_subject
 from kinertia.trial.trial_input import TrialInput
+from kinertia.workflow.person import Person
 from kinertia.workflow.prepare import prepare
 
 WALK_S, RATE_HZ = 2.7, 60.0
@@ -37,7 +38,7 @@ def recordings(person):
 @pytest.mark.slow
 def test_own_parameters_explain_another_walk_better_than_the_literature_s(recordings):
     inputs = [TrialInput(replace(lab.walk, name=name)) for lab, name in zip(recordings, ("one", "two"), strict=True)]
-    held_out = cross_validate(prepare(SUBJECT, recordings[0].static, inputs, Settings()))
+    held_out = cross_validate(prepare(Person(SUBJECT, inputs, recordings[0].static), Settings()))
     assert [held.trial for held in held_out] == ["one", "two"]
     assert held_out[0].others == ("two",)
     for held in held_out:
@@ -56,7 +57,7 @@ def test_frozen_parameters_stay(person):
 
 def test_one_trial_cannot_be_held_out(recordings):
     with pytest.raises(KinertiaError, match=r"at least two trials.*the subject has 1"):
-        cross_validate(prepare(SUBJECT, recordings[0].static, [TrialInput(recordings[0].walk)], Settings()))
+        cross_validate(prepare(Person(SUBJECT, [TrialInput(recordings[0].walk)], recordings[0].static), Settings()))
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.settings import Settings, Subject
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.estimate import estimate_bsp, light_plates
+from kinertia.workflow.person import Person
 from recordings import FITTED, slow_beside
 
 walks = pytest.mark.parametrize("name", slow_beside(("synthetic", "gait2354"), FITTED))
@@ -140,11 +141,9 @@ def test_settings_and_subject_reach_the_result(c3d_lab, short_fit):
     walk, static = (read_recording(c3d_lab / f"{kind}.c3d") for kind in ("walk", "static"))
     shares = []
     fit = estimate_bsp(
-        Subject(name="A", sex="male", mass_kg=77.0),
-        static,
-        [TrialInput(walk, (1.2, 1.45))],
+        Person(Subject(name="A", sex="male", mass_kg=77.0), [TrialInput(walk, (1.2, 1.45))], static),
         Settings(method="two-level", bsp="deleva", symmetry=False, cutoff_hz=6.0, hip_centre="harrington"),
-        progress=lambda stage, share: shares.append((stage, share)),
+        lambda stage, share: shares.append((stage, share)),
     )
     assert fit.literature.total_mass_kg == pytest.approx(77.0)
     (found,) = [finding for finding in fit.findings if finding.code == "S103"]

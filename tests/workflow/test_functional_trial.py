@@ -61,7 +61,7 @@ def lab():
 def fit(lab):
     measured, squats = lab
     return estimate(
-        prepare(SUBJECT, measured.static, [TrialInput(measured.walk), TrialInput(squats, use="kinematics")])
+        prepare(Person(SUBJECT, [TrialInput(measured.walk), TrialInput(squats, use="kinematics")], measured.static))
     )
 
 
@@ -89,9 +89,9 @@ def test_axes_of_knees_are_found(fit):
 def test_its_skin_leaves_markers_where_the_walk_has_them(lab):
     """Squats draw skin: with the walk's markers drawn along, ankles were 6 mm, and their moments 3 N m, off."""
     measured, squats = lab
-    alone = prepare(SUBJECT, measured.static, [TrialInput(measured.walk)], Settings(joint_axes=True)).skeleton
+    alone = prepare(Person(SUBJECT, [TrialInput(measured.walk)], measured.static), Settings(joint_axes=True)).skeleton
     inputs = [TrialInput(measured.walk), TrialInput(squats, use="kinematics")]
-    together = prepare(SUBJECT, measured.static, inputs).skeleton
+    together = prepare(Person(SUBJECT, inputs, measured.static)).skeleton
     assert together.labels == alone.labels
     assert np.linalg.norm(together.marker_locals - alone.marker_locals, axis=1).max() < 0.003
 
@@ -99,13 +99,13 @@ def test_its_skin_leaves_markers_where_the_walk_has_them(lab):
 def test_a_trial_with_forces_is_needed(lab):
     measured, squats = lab
     with pytest.raises(SettingsError, match="forces"):
-        prepare(SUBJECT, measured.static, [TrialInput(squats, use="kinematics")])
+        prepare(Person(SUBJECT, [TrialInput(squats, use="kinematics")], measured.static))
 
 
 def test_forces_of_such_a_trial_are_not_used(lab):
     measured, _ = lab
     again = replace(measured.walk, name="again")
-    ready = prepare(SUBJECT, measured.static, [TrialInput(measured.walk), TrialInput(again, use="kinematics")])
+    ready = prepare(Person(SUBJECT, [TrialInput(measured.walk), TrialInput(again, use="kinematics")], measured.static))
     assert [trial.trial.name for trial in ready.functional] == ["again"]
     assert ready.functional[0].trial.loads.plates == ()
     assert [trial.trial.name for trial in ready.kinematics] == ["walk"]
@@ -160,7 +160,7 @@ def test_a_window_with_hardly_any_of_its_frames_leaves_it_out(lab, window_s):
     ]
     assert (found.code, found.evidence["key"].value) == ("F191", "window_s")
     assert checked.overview.line.endswith("1 of 2 trials was used.")
-    ready = prepare(SUBJECT, measured.static, inputs)
+    ready = prepare(Person(SUBJECT, inputs, measured.static))
     assert (ready.functional, ready.left_out) == ((), ("squat",))
 
 
@@ -170,7 +170,7 @@ def test_check_and_fit_say_alike_that_it_is_too_short(lab, frames):
     short = replace(squats, markers=squats.markers.cut(1.0, 1.0 + (frames - 0.5) / squats.markers.rate_hz))
     inputs = [TrialInput(measured.walk), TrialInput(short, use="kinematics")]
     checked = check_person(Person(SUBJECT, inputs, measured.static))
-    ready = prepare(SUBJECT, measured.static, inputs)
+    ready = prepare(Person(SUBJECT, inputs, measured.static))
     for findings in (checked.findings, ready.findings):
         (found,) = [
             finding for finding in findings if finding.where.trial == "squat" and finding.severity.name == "ERROR"
@@ -208,7 +208,7 @@ def test_axes_and_their_deviations_hold_over_people():
     for seed in range(101, 107):
         measured, squats = recorded(seed)
         inputs = [TrialInput(measured.walk), TrialInput(squats, use="kinematics")]
-        found = estimate(prepare(SUBJECT, measured.static, inputs, Settings())).posterior.calibration
+        found = estimate(prepare(Person(SUBJECT, inputs, measured.static), Settings())).posterior.calibration
         for entry in found:
             name = f"knee_tilt_{entry.axis}_{str(entry.joint)[-1]}"
             if entry.quantity == AXIS and name in TILTS_DEG and str(entry.joint).startswith("knee"):

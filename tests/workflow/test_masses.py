@@ -27,6 +27,7 @@ from kinertia.synthetic.walk import MASS_KG, walk, walking_subject
 from kinertia.workflow.from_files import fit_subject
 from kinertia.workflow.known_body import KnownBody
 from kinertia.workflow.masses import at_common_gain, common_gain, with_attached, with_doubted_mass
+from kinertia.workflow.person import Person
 from kinertia.workflow.prepare import prepare
 
 PACK = {"name": "rucksack", "segment": "torso", "com_mm": [-200, 300, 0], "on_scale": False}
@@ -235,16 +236,15 @@ def test_things_that_weigh_more_than_the_scale_said_are_an_error():
 
 def test_two_level_refuses_what_it_would_ignore(synthetic_lab):
     subject = walking_subject()
-    person = Subject(name="A", mass_kg=MASS_KG, height_m=1.8, sex="male")
-    settings = Settings(method="two-level")
+    person = Person(Subject(name="A", mass_kg=MASS_KG, height_m=1.8, sex="male"), [], subject.static)
     model = read_osim(synthetic_lab / "scaled.osim")
-    for unused, source, given in (
-        ("[[attached]]", subject.static, {"attached": [Attached(mass_kg=1.0, **PACK)]}),
-        ("priors", subject.static, {"prior": literature_prior(subject.bsp)}),
-        ("OpenSim models", model, {}),
+    for unused, given, prior in (
+        ("[[attached]]", replace(person, attached=[Attached(mass_kg=1.0, **PACK)]), None),
+        ("priors", person, literature_prior(subject.bsp)),
+        ("OpenSim models", replace(person, static=None, model=model), None),
     ):
         with pytest.raises(SettingsError) as caught:
-            prepare(person, source, [], settings, **given)
+            prepare(given, Settings(method="two-level"), prior=prior)
         evidence = caught.value.finding.evidence
         assert evidence["entry"].value == "method"
         assert unused in evidence["expected"].value

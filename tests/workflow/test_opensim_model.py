@@ -16,6 +16,7 @@ from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.settings import Subject
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.opensim_model import at_mass, kind_of, partition, with_centre_offsets
+from kinertia.workflow.person import Person
 from kinertia.workflow.prepare import prepare
 from recordings import here
 from refusals import expect_evidence, expect_filled, refused
@@ -44,7 +45,7 @@ def walk(recording_of):
 
 @pytest.fixture(scope="module")
 def prepared(model, walk):
-    return prepare(SUBJECT, model, [TrialInput(walk)])
+    return prepare(Person(SUBJECT, [TrialInput(walk)], model=model))
 
 
 def without(recording, labels):
@@ -83,7 +84,7 @@ def test_a_default_other_than_zero_is_kept(model, walk):
     joints = tuple(
         replace(joint, coordinates=tuple(replace(c, default=0.1) for c in joint.coordinates)) for joint in model.joints
     )
-    ready = prepare(SUBJECT, replace(model, joints=joints), [TrialInput(walk)])
+    ready = prepare(Person(SUBJECT, [TrialInput(walk)], model=replace(model, joints=joints)))
     assert ready.skeleton.locked == {"mtp_angle_r": 0.1, "mtp_angle_l": 0.1}
 
 
@@ -155,14 +156,14 @@ def test_masses_are_those_of_the_person(model, walk):
     assert scaled.total_mass_kg == pytest.approx(80.0)
     np.testing.assert_allclose(scaled.inertia_kgm2, model.bsp.inertia_kgm2 * factor)
     np.testing.assert_array_equal(scaled.com_m, model.bsp.com_m)
-    ready = prepare(SUBJECT.model_copy(update={"mass_kg": 75.0}), model, [TrialInput(walk)])
+    ready = prepare(Person(SUBJECT.model_copy(update={"mass_kg": 75.0}), [TrialInput(walk)], model=model))
     (found,) = of_code(ready, "O411")
     expect_evidence(found, factor=75.0 / 72.6, model_kg=72.6, stated_kg=75.0)
     assert ready.literature.total_mass_kg == pytest.approx(75.0)
 
 
 def test_calibration_moves_markers_and_frees_joint_centres(model, walk):
-    ready = prepare(SUBJECT, model, [TrialInput(walk)], calibrate=True)
+    ready = prepare(Person(SUBJECT, [TrialInput(walk)], model=model, calibrate=True))
     joints = [f"to_{body}" for body in ("femur_r", "femur_l", "torso", "humerus_r", "humerus_l")]
     assert set(ready.uncertainty.centres) == {f"{j}/offset_{a}" for j in joints for a in "xyz"}
     assert ready.kinematics[0].ik.marker_rms_m < 0.010
@@ -212,7 +213,7 @@ def test_arms_do_not_turn_over(file_of, file, trial):
 def test_a_model_without_markers(model, walk, tmp_path):
     export_osim(tmp_path / "bare.osim", replace(model.skeleton, markers=()), model.bsp)
     with refused("O106", error=OsimError) as caught:
-        prepare(SUBJECT, read_osim(tmp_path / "bare.osim"), [TrialInput(walk)])
+        prepare(Person(SUBJECT, [TrialInput(walk)], model=read_osim(tmp_path / "bare.osim")))
     assert caught.value.finding.where.file == "bare.osim"
 
 
@@ -225,7 +226,7 @@ def test_a_model_without_feet(model, walk):
     bsp = BodySegmentParameters.from_table(names, model.bsp.table()[rows])
     footless = replace(model, skeleton=replace(model.skeleton, joints=joints, markers=markers), bsp=bsp)
     with pytest.raises(BlockedError) as stopped:
-        prepare(SUBJECT, footless, [TrialInput(walk)])
+        prepare(Person(SUBJECT, [TrialInput(walk)], model=footless))
     found = stopped.value.blocking
     assert [(finding.code, finding.where.part) for finding in found] == [("O107", "right foot"), ("O107", "left foot")]
     expect_evidence(found[0], expected="calcn_r")
@@ -235,19 +236,19 @@ def test_a_model_without_feet(model, walk):
 def test_a_trial_without_markers_of_a_foot(model, walk):
     left = [m.label for m in model.skeleton.markers if m.segment == "calcn_l"]
     with blocked("M104") as found:
-        prepare(SUBJECT, model, [TrialInput(without(walk, left))])
+        prepare(Person(SUBJECT, [TrialInput(without(walk, left))], model=model))
     assert (found[0].where.trial, found[0].where.part) == ("walk", "left foot")
 
 
 def test_mass_is_needed_and_nothing_else(model, walk):
     with pytest.raises(SubjectError) as caught:
-        prepare(Subject(name="A"), model, [TrialInput(walk)])
+        prepare(Person(Subject(name="A"), [TrialInput(walk)], model=model))
     assert (caught.value.field, caught.value.finding.code) == ("mass_kg", "S101")
 
 
 def test_somebody_old_is_reported_with_a_model_too(model, walk):
     old = SUBJECT.model_copy(update={"age_years": 72.0})
-    (found,) = of_code(prepare(old, model, [TrialInput(walk)]), "S401")
+    (found,) = of_code(prepare(Person(old, [TrialInput(walk)], model=model)), "S401")
     assert (found.severity, found.evidence["population"].value) == (Severity.INFO, "elderly")
 
 
@@ -258,7 +259,7 @@ def test_mass_without_inertia_is_refused(model, walk, factor):
     inertia = np.where((np.array(bsp.segments) == "femur_r")[:, None, None], factor, 1.0) * bsp.inertia_kgm2
     bad = replace(model, bsp=replace(bsp, inertia_kgm2=inertia))
     with blocked("O202") as found:
-        prepare(SUBJECT, bad, [TrialInput(walk)])
+        prepare(Person(SUBJECT, [TrialInput(walk)], model=bad))
     assert found[0].where.part == "femur_r"
     expect_evidence(found[0], mass_kg=bsp.mass_kg[bsp.segments.index("femur_r")])
 
@@ -266,7 +267,7 @@ def test_mass_without_inertia_is_refused(model, walk, factor):
 def test_inertias_too_small_for_the_mass_are_said(model, walk, prepared):
     assert not of_code(prepared, "O203")
     small = replace(model, bsp=replace(model.bsp, inertia_kgm2=0.1 * model.bsp.inertia_kgm2))
-    found = of_code(prepare(SUBJECT, small, [TrialInput(walk)]), "O203")
+    found = of_code(prepare(Person(SUBJECT, [TrialInput(walk)], model=small)), "O203")
     assert "femur_r" in [finding.where.part for finding in found]
     for finding in found:
         assert finding.severity is Severity.WARNING
@@ -280,7 +281,7 @@ def test_joints_that_do_not_mirror_each_other_are_said(model, walk, prepared):
         for j in model.skeleton.joints
     )
     moved = replace(model, skeleton=replace(model.skeleton, joints=joints))
-    ready = prepare(SUBJECT, moved, [TrialInput(walk)])
+    ready = prepare(Person(SUBJECT, [TrialInput(walk)], model=moved))
     (found,) = [finding for finding in ready.findings if finding.code.startswith("O30")]
     assert (found.code, found.severity) == ("O303", Severity.WARNING)
     assert (found.evidence["right"].value, found.evidence["left"].value) == ("talus_r", "talus_l")
@@ -291,6 +292,6 @@ def test_markers_in_millimetres_are_refused(model, walk):
     skeleton = model.skeleton.with_positions(1000.0 * model.skeleton.marker_locals)
     m = 1000.0 * np.linalg.norm(model.skeleton.marker_locals[model.skeleton.labels.index("Top.Head")])
     with blocked("O301") as found:
-        prepare(SUBJECT, replace(model, skeleton=skeleton), [TrialInput(walk)])
+        prepare(Person(SUBJECT, [TrialInput(walk)], model=replace(model, skeleton=skeleton)))
     expect_evidence(found[0], what="marker Top.Head")
     assert found[0].evidence["length_m"].value == pytest.approx(m, abs=0.5)

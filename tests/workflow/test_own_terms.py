@@ -11,6 +11,7 @@ from kinertia.estimation.simultaneous.terms.cost_term import CostTerm
 from kinertia.settings import Settings, Subject
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.estimate import estimate
+from kinertia.workflow.person import Person
 from kinertia.workflow.prepare import prepare
 
 HEAVIER, SD_KG = 1.1, 0.02
@@ -39,7 +40,7 @@ class WeighedThigh(CostTerm):
 @pytest.fixture(scope="module")
 def ready(recording_of):
     walk, static = (recording_of(f"synthetic/{kind}.c3d") for kind in ("walk", "static"))
-    return prepare(Subject(name="A", sex="male"), static, [TrialInput(walk, (1.2, 1.7), 0.25)])
+    return prepare(Person(Subject(name="A", sex="male"), [TrialInput(walk, (1.2, 1.7), 0.25)], static))
 
 
 def thighs(fit):

@@ -11,6 +11,7 @@ from kinertia.findings.quantity import Where
 from kinertia.settings import Subject
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow import built_in_model as module
+from kinertia.workflow.person import Person
 from kinertia.workflow.prepare import prepare
 
 
@@ -21,7 +22,7 @@ def recordings(recording_of):
 
 
 def prepared_from(static, *inputs):
-    return prepare(Subject(name="A", sex="male"), static, inputs)
+    return prepare(Person(Subject(name="A", sex="male"), inputs, static))
 
 
 def test_a_trial_that_its_labels_block_does_not_move_the_model(recordings, monkeypatch):
@@ -63,7 +64,7 @@ def test_a_head_beside_four_markers_of_the_trunk_is_left_out_and_named(recording
 def test_a_range_that_the_user_states_is_the_models_and_is_named(recordings):
     static, walk = recordings
     subject = Subject(name="A", sex="male", ranges_deg={"knee_angle_r": (-20, 150), "elbow_flex_l": (-12, 150)})
-    ready = prepare(subject, static, [TrialInput(walk, (1.2, 1.9))])
+    ready = prepare(Person(subject, [TrialInput(walk, (1.2, 1.9))], static))
     knee, elbow = (ready.skeleton.ranges[name] for name in subject.ranges_deg)
     assert (np.degrees(knee.low), knee.clamped, knee.stated) == (pytest.approx(-20.0), False, True)
     assert (np.degrees(elbow.low), elbow.clamped, elbow.stated) == (pytest.approx(-12.0), True, True)
@@ -77,4 +78,4 @@ def test_a_range_of_no_coordinate_is_refused(recordings):
     static, walk = recordings
     subject = Subject(name="A", sex="male", ranges_deg={"knee_r": (-20, 150)})
     with pytest.raises(SettingsError, match="no coordinate knee_r moves; there is knee_angle_r"):
-        prepare(subject, static, [TrialInput(walk, (1.2, 1.9))])
+        prepare(Person(subject, [TrialInput(walk, (1.2, 1.9))], static))

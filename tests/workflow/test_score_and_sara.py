@@ -17,6 +17,7 @@ from kinertia.model.skeleton import skin_angles
 from kinertia.synthetic.laboratory import PERFECT, SkinMotion, camera_noise, record
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.data import Markers, Recording
+from kinertia.workflow.person import Person
 
 TILTS_DEG = {"knee_tilt_1_r": 4.0, "knee_tilt_2_r": -3.0, "knee_tilt_1_l": -4.0, "knee_tilt_2_l": -3.0}
 HIPS_M = {"hip_x_r": 0.008, "hip_y_r": -0.006, "hip_x_l": 0.008, "hip_z_l": 0.006}
@@ -91,7 +92,7 @@ def compared(seed):
     exact = Markers(time, skeleton.labels, skeleton.marker_positions(skeleton.pose(q)))
     swinging = Recording("swings", seen(exact, q))
     inputs = [TrialInput(walked), TrialInput(swinging, use="kinematics")]
-    return skeleton, estimate(prepare(Subject(sex="male"), lab.static, inputs, Settings())), swinging.markers
+    return skeleton, estimate(prepare(Person(Subject(sex="male"), inputs, lab.static), Settings())), swinging.markers
 
 
 def knee_axis(skeleton, side):

@@ -21,7 +21,6 @@ from kinertia.estimation.result.fit import Fit
 from kinertia.io.file_names import command_line
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.samples import SHA256, sample_walk
-from kinertia.io.subject.person_recordings import read_inputs
 from kinertia.io.subject.provenance import provenance_of
 from kinertia.io.subject.reader import read_subject, with_settings
 from kinertia.io.subject.tables import SubjectFile
@@ -33,7 +32,6 @@ from kinertia.report.pages.truth_comparison import Truth
 from kinertia.settings import MethodName
 from kinertia.synthetic.laboratory import LabNoise, record, write_lab
 from kinertia.synthetic.walk import SyntheticTrial, unlike_literature, walk, walking_subject
-from kinertia.workflow.estimate import estimate_bsp
 from kinertia.workflow.from_files import fit_subject
 
 _SHOWN_JOINTS = ("hip flexion", "hip adduction", "knee", "ankle", "lumbar extension")
@@ -148,11 +146,9 @@ def run_demo(
     with complete_folder(folder, "demo") as work:
         progress("measuring", 0.0)
         wanted, trial = write_synthetic_lab(work / "lab", seed, noise)
-        static, inputs, marker_set = read_inputs(wanted, progress)
         of_method = [] if method == "simultaneous" else ["--method", method]
         provenance = provenance_of(wanted, command_line(["kinertia", "demo", *of_method, "-o", str(folder)]))
-        settings = with_settings(wanted, method=method).settings
-        fit = estimate_bsp(wanted.subject, static, inputs, settings, marker_set, progress)
+        fit = fit_subject(with_settings(wanted, method=method), progress)
         save_fit(fit, work, provenance, truth_of(trial, fit), force=True)
         demo = Demo(fit, trial, noise, folder / "lab" / "subject.toml")
         demo.table.to_csv(work / "bsp_truth.csv", index=False, lineterminator="\n")

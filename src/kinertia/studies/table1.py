@@ -28,6 +28,7 @@ from kinertia.synthetic.laboratory import study_noise
 from kinertia.synthetic.walk import Manner, SyntheticTrial, consistent_trial, walk, walking_subject, without_products
 from kinertia.trial.data import Markers
 from kinertia.trial.sampled_data import rms
+from kinertia.workflow.person import Person
 from kinertia.workflow.prepare import prepare
 
 CONDITIONS = {
@@ -213,7 +214,8 @@ def measured_trial(wanted: SubjectFile, progress: Progress = lambda stage, share
             reactions.
     """
     static, inputs, marker_set = read_inputs(wanted, progress)
-    ready = prepare(wanted.subject, static, inputs[:1], wanted.settings, marker_set, progress)
+    person = Person(wanted.subject, inputs[:1], static, marker_set=marker_set)
+    ready = prepare(person, wanted.settings, progress)
     measured = ready.kinematics[0]
     worn = [m for m in ready.skeleton.markers if m.label in measured.ik.labels]
     inside = np.abs(measured.time - measured.time.mean()) <= _STRIDE_S / 2 + 1e-9

@@ -24,18 +24,15 @@ from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveD
 from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level, intervals
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.gait27 import VIRTUAL_TRUNK
-from kinertia.model.imported_model import OsimModel
-from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, inverse_dynamics, joined, residual
 from kinertia.motion.ground_reactions import GroundReactions, ground_reactions, measured_reactions
 from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.smoothing import interpolate
 from kinertia.motion.workload import one_blas_thread
-from kinertia.settings import Attached, Overrule, Settings, Subject
-from kinertia.trial.data import Recording
-from kinertia.trial.trial_input import TrialInput
+from kinertia.settings import Settings
 from kinertia.workflow.masses import at_mass_of_plates
+from kinertia.workflow.person import Person
 from kinertia.workflow.prepare import prepare
 
 _BEYOND_EDGE = "P282"
@@ -43,41 +40,27 @@ _BEYOND_EDGE = "P282"
 
 @one_blas_thread
 def estimate_bsp(
-    subject: Subject,
-    source: Recording | OsimModel,
-    inputs: Sequence[TrialInput],
+    person: Person,
     settings: Settings | None = None,
-    marker_set: MarkerSet | None = None,
     progress: Progress = lambda stage, share: None,
     prior: BspPrior | None = None,
-    attached: Sequence[Attached] = (),
-    overrule: Overrule | None = None,
-    calibrate: bool = False,
     terms: Sequence[type[CostTerm]] = (),
 ) -> Fit:
     """Estimate a person's body segment parameters from one or more trials, with the built-in model or the user's own.
 
     Args:
-        subject: mass and height may be None where a recording carries them; height and sex with an OpenSim model.
-        source: of the model: the person standing, for the built-in one; or a scaled OpenSim model, as
-            `kinertia.io.opensim.reader.read_osim` reads it, for the simultaneous estimate.
-        inputs: the trials.
+        person: the recordings, and what is stated; `read_person` reads them, too.
         settings: defaults if None.
-        marker_set: found from the static trial's labels if None; none with an OpenSim model.
         progress: called as the work goes on.
         prior: of the body segment parameters, for the simultaneous estimate; the literature's, or around the OpenSim
             model's, if None.
-        attached: what the person wore or carried in all trials.
-        overrule: findings that do not block, or are not shown.
-        calibrate: let markers and joint centres of an OpenSim model move; else they are fixed.
         terms: as in `fit_subject`.
 
     Raises:
         KinertiaError: the subject, a marker set, the model or a trial cannot be used; the message states why and what
             to do.
     """
-    ready = prepare(subject, source, inputs, settings, marker_set, progress, prior, attached, overrule, calibrate)
-    return estimate(ready, progress, terms)
+    return estimate(prepare(person, settings, progress, prior), progress, terms)
 
 
 @one_blas_thread

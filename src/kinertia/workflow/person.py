@@ -43,14 +43,14 @@ class Person:
     """One person as given, before any question is asked.
 
     Attributes:
-        subject: stated data.
+        subject: stated data; mass and height may be None where a recording has them, height and sex with a model.
         trials: recordings of motions, in the order given.
         static: the static trial.
         more_statics: further recordings in which the person stands, of which none is the static trial.
         marker_set: the laboratory's; found among the presets if None.
-        model: the OpenSim model, in place of the static trial.
-        calibrate: whether markers and joint centres of the model may move.
-        attached: what the person wore or carried.
+        model: a scaled OpenSim model, as `kinertia.io.opensim.reader.read_osim` reads it, in place of the static trial.
+        calibrate: whether markers and joint centres of that model may move.
+        attached: what the person wore or carried in all trials.
         overrule: what the user overrules, for all trials.
         overrule_of: what the user overrules in single trials, by name.
         unread: findings of files that could not be read.

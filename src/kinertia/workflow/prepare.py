@@ -14,12 +14,8 @@ from kinertia.diagnostics.subject.body_data import stated_ranges
 from kinertia.errors import SettingsError
 from kinertia.estimation.prepared import Prepared, Progress, check_trials
 from kinertia.estimation.prior import BspPrior
-from kinertia.model.imported_model import OsimModel
-from kinertia.model.marker_set import MarkerSet
 from kinertia.motion.workload import one_blas_thread
-from kinertia.settings import Attached, Overrule, Settings, Subject
-from kinertia.trial.data import Recording
-from kinertia.trial.trial_input import TrialInput
+from kinertia.settings import Settings
 from kinertia.workflow.masses import with_attached, with_doubted_mass
 from kinertia.workflow.person import Person, PersonModel, RotatedTrial, expect_forces, solved_trials, usable_trial
 from kinertia.workflow.screening import Screened, screen
@@ -30,16 +26,10 @@ if TYPE_CHECKING:
 
 @one_blas_thread
 def prepare(
-    subject: Subject,
-    source: Recording | OsimModel,
-    inputs: Sequence[TrialInput],
+    person: Person,
     settings: Settings | None = None,
-    marker_set: MarkerSet | None = None,
     progress: Progress = lambda stage, share: None,
     prior: BspPrior | None = None,
-    attached: Sequence[Attached] = (),
-    overrule: Overrule | None = None,
-    calibrate: bool = False,
 ) -> Prepared:
     """Return calibrated skeleton, prior and smoothed kinematics of all trials; arguments are as in `estimate_bsp`.
 
@@ -47,17 +37,6 @@ def prepare(
         BlockedError: findings leave no trial, with all of them.
         KinertiaError: the subject, a marker set or the model cannot be used.
     """
-    static, model = (None, source) if isinstance(source, OsimModel) else (source, None)
-    person = Person(
-        subject,
-        inputs,
-        static,
-        marker_set=marker_set,
-        model=model,
-        calibrate=calibrate,
-        attached=attached,
-        overrule=overrule or Overrule(),
-    )
     return prepared(screen(person), settings or Settings(), progress, prior)
 
 

@@ -15,6 +15,7 @@ from kinertia.synthetic.walk import walking_subject
 from kinertia.trial.data import Markers, Recording
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.estimate import estimate
+from kinertia.workflow.person import Person
 from kinertia.workflow.prepare import prepare
 from people import person
 from recordings import WALKS
@@ -127,7 +128,9 @@ def fits(walk):
     results = {}
     for name, segments in {"all": [], "no arms": arms, "no trunk": [*arms, "torso"]}.items():
         marker_set, gone = without(whole, segments)
-        ready = prepare(RAJAGOPAL, lacking(static, gone), [TrialInput(lacking(trial, gone))], None, marker_set)
+        ready = prepare(
+            Person(RAJAGOPAL, [TrialInput(lacking(trial, gone))], lacking(static, gone), marker_set=marker_set)
+        )
         results[name] = ready, estimate(ready)
     return results
 

@@ -11,12 +11,13 @@ from kinertia.report.exports.files import save_fit
 from kinertia.settings import Settings, Subject
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.estimate import estimate_bsp
+from kinertia.workflow.person import Person
 
 
 def fit_of_files(recording_of, folder: str, sex: str, window_s: tuple[float, float] | None = None) -> Fit:
     walked, static = (recording_of(f"{folder}{kind}.c3d") for kind in ("walk", "static"))
     trial = TrialInput(walked, window_s=window_s)
-    return estimate_bsp(Subject(name="B", sex=sex), static, [trial], Settings(method="simultaneous"))
+    return estimate_bsp(Person(Subject(name="B", sex=sex), [trial], static), Settings(method="simultaneous"))
 
 
 @pytest.fixture(scope="module")

@@ -12,6 +12,7 @@ from kinertia.settings import Subject
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.estimate import estimate
+from kinertia.workflow.person import Person
 from kinertia.workflow.prepare import prepare
 from refusals import only, refused
 from theia_file import plates, write_theia
@@ -84,7 +85,7 @@ def test_a_walk_of_poses_is_fitted(person, tmp_path):
     path = write_theia(tmp_path / "walk.c3d", trial, 0.002, np.random.default_rng(1))
     recording = replace(read_c3d(path), plates=plates(trial))
     subject = Subject(name="one", mass_kg=person.bsp.total_mass_kg, height_m=1.8, sex="male")
-    fit = estimate(prepare(subject, read_c3d(path, standing=True), [TrialInput(recording)]))
+    fit = estimate(prepare(Person(subject, [TrialInput(recording)], read_c3d(path, standing=True))))
     assert fit.converged
     fitted = fit.trials[0]
     assert np.sqrt(np.square(fitted.residuals["estimate"][:, :3]).sum(axis=1).mean()) < 6.0

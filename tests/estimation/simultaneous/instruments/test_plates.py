@@ -26,6 +26,7 @@ from kinertia.estimation.simultaneous.instruments.plates import (
 from kinertia.settings import Subject
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.estimate import estimate
+from kinertia.workflow.person import Person
 from kinertia.workflow.prepare import prepare
 
 N, PLATES = 5, 3
@@ -137,7 +138,7 @@ def clock_ms(recording_of, person, *moved_ms):
     late = {}
     for late_ms in moved_ms:
         plates = replace(walk.plates, time=walk.plates.time + late_ms / 1e3)
-        fit = estimate(prepare(Subject(sex="male"), static, [TrialInput(replace(walk, plates=plates))]))
+        fit = estimate(prepare(Person(Subject(sex="male"), [TrialInput(replace(walk, plates=plates))], static)))
         # of a single trial its own is the total
         (total,) = (
             error for error in fit.posterior.calibration if error.quantity == "delay" and error.trial is not None
