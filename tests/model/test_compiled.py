@@ -42,42 +42,85 @@ def test_all_files_with_compiled_functions_are_among_the_sources():
     assert users | {"model/compiled.py"} == set(compiled.SOURCES)
 
 
+def in_cache(folder: Path) -> dict[str, str]:
+    """Environment of a user whose cache is in this folder, on any system but Windows."""
+    return {"XDG_CACHE_HOME": str(folder / "cache"), "HOME": str(folder)}
+
+
+def places(folder: Path) -> tuple[Path, Path]:
+    """Where that user's cache may be: on Linux or on macOS."""
+    return folder / "cache" / "kinertia", folder / "Library" / "Caches" / "kinertia"
+
+
 def test_a_change_of_any_source_leads_to_another_folder(installation):
     before = run(installation, FOLDER)
-    assert Path(before).parent == installation / "model" / "__pycache__"
     source = installation / "motion" / "marker_sums.py"
     source.write_text(source.read_text(encoding="utf-8") + "\n# changed\n", encoding="utf-8")
-    assert run(installation, FOLDER) != before
+    after = run(installation, FOLDER)
+    assert after != before
+    assert Path(after).parent == installation / "model" / "__pycache__"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows states the cache elsewhere")
+def test_other_environments_find_what_is_compiled(installation, tmp_path):
+    """In the user's cache, unless their owner has compiled beside the package."""
+    user = in_cache(tmp_path)
+    compiled_beside = Path(run(installation, FOLDER, **user))
+    (compiled_beside / "code").write_text("")
+    run(installation, "from kinertia.model.compiled import set_compiled as s; s()", **user)
+    assert Path(run(installation, FOLDER, **user)) == compiled_beside
+    shutil.rmtree(compiled_beside)
+    found = Path(run(installation, FOLDER, **user))
+    assert found.parent in places(tmp_path)
+    assert found.name == compiled_beside.name
+    assert {path.name for path in found.iterdir()} == {"code", compiled._COMPLETE}
 
 
 @pytest.mark.skipif(sys.platform == "win32" or os.geteuid() == 0, reason="root may write everywhere")
 def test_an_installation_that_may_only_be_read_keeps_them_in_the_users_cache(installation, tmp_path):
     (installation / "model").chmod(0o555)
-    folder = run(installation, FOLDER, XDG_CACHE_HOME=str(tmp_path / "cache"), HOME=str(tmp_path))
-    assert Path(folder).parent in (tmp_path / "cache" / "kinertia", tmp_path / "Library" / "Caches" / "kinertia")
+    folder = run(installation, FOLDER, **in_cache(tmp_path))
+    assert Path(folder).parent in places(tmp_path)
+
+
+@pytest.mark.parametrize("changed", ["numba.__version__", "llvmlite.__version__", "llvm.get_host_cpu_name"])
+def test_what_compiles_has_a_folder_of_its_own(monkeypatch, changed):
+    before = compiled.cache_folder()
+    monkeypatch.setattr(compiled, "_writable", lambda folder: True)
+    monkeypatch.setattr(f"kinertia.model.compiled.{changed}", (lambda: "m68k") if "name" in changed else "0.0")
+    compiled.cache_folder.cache_clear()
+    try:
+        assert compiled.cache_folder().name != before.name
+    finally:
+        compiled.cache_folder.cache_clear()
 
 
 @pytest.mark.parametrize("place", ["cache", "temporary"])
-def test_where_the_package_cannot_be_written_to(monkeypatch, place):
+def test_where_the_package_cannot_be_written_to(monkeypatch, tmp_path, place):
     """The user's cache, or where there is none either, the folder for temporary files."""
-    expected = {"cache": compiled._user_cache(), "temporary": Path(compiled.tempfile.gettempdir())}[place]
-    compiled.cache_folder.cache_clear()
+    expected = {"cache": tmp_path / "cache", "temporary": tmp_path / "temporary"}[place]
+    monkeypatch.setattr(compiled, "_user_cache", lambda: tmp_path / "cache")
+    monkeypatch.setattr(compiled.tempfile, "gettempdir", lambda: str(tmp_path / "temporary"))
+    monkeypatch.setattr(compiled, "_COMPLETE", "never")
     monkeypatch.setattr(compiled, "_writable", lambda folder: folder.parent == expected)
+    compiled.cache_folder.cache_clear()
     try:
         assert compiled.cache_folder().parent == expected
     finally:
         compiled.cache_folder.cache_clear()
 
 
-def test_folders_of_older_states_go_when_all_is_compiled(monkeypatch, tmp_path):
-    here, other = (tmp_path / "__pycache__" / name for name in ("kinertia-new", "kinertia-old"))
-    for folder in (here, other):
-        folder.mkdir(parents=True)
-    monkeypatch.setattr(compiled, "cache_folder", lambda: here)
+def test_the_newest_folders_stay_when_all_is_compiled(monkeypatch, tmp_path):
+    folders = [tmp_path / f"kinertia-{number}" for number in range(7)]
+    for age, folder in enumerate(folders):
+        folder.mkdir()
+        os.utime(folder, (1e9 - age, 1e9 - age))
+    monkeypatch.setattr(compiled, "cache_folder", lambda: folders[6])
+    monkeypatch.setattr(compiled, "_user_cache", lambda: tmp_path)
     assert not compiled.is_compiled()
     compiled.set_compiled()
     assert compiled.is_compiled()
-    assert not other.exists()
+    assert [folder.exists() for folder in folders] == [True] * 4 + [False] * 2 + [True]
 
 
 def compiled_functions() -> list[CPUDispatcher]:
@@ -151,11 +194,3 @@ def test_a_kept_function_raises_numbas_errors_without_loading_the_modules_they_c
     said = [run(PACKAGE.parent / "kinertia", program).splitlines() for _ in range(2)]
     error = "negative dimensions not allowed"
     assert said == [["[0.0, 0.0] True", error], ["[0.0, 0.0] False", error]]
-
-
-def test_other_packages_functions_are_kept_where_they_were():
-    from numba.core import config
-
-    before = config.CACHE_DIR
-    compiled.compiled(lambda x: x)
-    assert before == config.CACHE_DIR

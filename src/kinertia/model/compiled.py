@@ -1,9 +1,10 @@
 """Compiles functions to machine code by Numba, once per machine: `kinertia warm-up`, or the first run.
 
-Functions over the frames of a trial are compiled, and stored in a folder whose name is a hash of their sources: if a
-line of a compiled function changes, or another version is installed, they are compiled again, and code of older lines
-never runs. The folder is beside this file or, if that is not writable, in the user's cache; if neither is, in the
-folder for temporary files.
+Functions over the frames of a trial are compiled, and stored in a folder whose name is a hash of their sources, of the
+processor and of what compiles them: if a line of a compiled function changes, they are compiled again, and code of
+older lines never runs. The folder is beside this file or, if that is not writable, in the user's cache; if neither is,
+in the folder for temporary files. A copy goes to the user's cache, where other environments with the same sources find
+it.
 
 Numba also stores what other functions, compiled later, would need to inline it: as much again, which takes longer to
 load than the machine code. Only Python calls the functions stored here.
@@ -13,14 +14,17 @@ The digit is the number of dimensions. Strided arrays may be parts of larger one
 
 import hashlib
 import shutil
+import sys
 import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
+import llvmlite
+import numba
 import numpy as np
 import platformdirs
 from llvmlite import binding as llvm
@@ -30,6 +34,8 @@ from numba.core.runtime import rtsys
 F = TypeVar("F", bound=Callable[..., Any])
 _COMPLETE = "complete"
 """File that marks a complete folder."""
+_KEPT = 5
+"""Number of folders that are kept in a place: the newest."""
 SOURCES = (
     "model/compiled.py",
     "model/kinematic_tree.py",
@@ -65,10 +71,8 @@ def compiled_sums(function: F) -> F:
 
 
 def _stored(function: F, **options: Any) -> F:
-
     result: Any = _compiled(function, **options)
-    with _kept_in(cache_folder()):
-        result._cache = MachineCodeCache(function)
+    result._cache = MachineCodeCache(function)
     return cast(F, result)
 
 
@@ -94,22 +98,23 @@ def is_stored(value: Any, module: str) -> bool:
 
 
 def _compiled(function: F, **options: Any) -> F:
-    import numba  # imported here so that commands which compute nothing do not load it
-
     result: F = numba.njit(error_model="numpy", nogil=True, no_cfunc_wrapper=True, **options)(function)
     return result
 
 
 @cache
 def cache_folder() -> Path:
-    """Return the folder of compiled functions: a separate one for every state of their sources."""
+    """Return the folder of compiled functions: a separate one for every state of their sources and of what compiles."""
     package = Path(__file__).parents[1]
-    text = hashlib.sha256()
+    compiler = (sys.implementation.cache_tag, numba.__version__, llvmlite.__version__, llvm.get_host_cpu_name())
+    text = hashlib.sha256(" ".join(compiler).encode())
     for name in SOURCES:
         text.update((package / name).read_bytes())
     name = f"kinertia-{text.hexdigest()[:16]}"
-    places = (Path(__file__).parent / "__pycache__", _user_cache(), Path(tempfile.gettempdir()))
-    return next((place / name for place in places if _writable(place / name)), places[-1] / name)
+    beside = Path(__file__).parent / "__pycache__"
+    places = [place / name for place in (beside, _user_cache(), Path(tempfile.gettempdir()))]
+    complete = (place for place in places if (place / _COMPLETE).exists())
+    return next(complete, None) or next((place for place in places if _writable(place)), places[-1])
 
 
 def is_compiled() -> bool:
@@ -118,13 +123,17 @@ def is_compiled() -> bool:
 
 
 def set_compiled() -> None:
-    """Record that everything has been compiled, and delete what earlier states of the sources left beside it."""
+    """Record that everything has been compiled, copy it to the user's cache, and delete all but the newest folders."""
     folder = cache_folder()
+    shared = _user_cache() / folder.name
     with suppress(OSError):
         (folder / _COMPLETE).touch()
-        for other in folder.parent.glob("kinertia-*"):
-            if other != folder and folder.parent.name == "__pycache__":
-                shutil.rmtree(other, ignore_errors=True)
+        if not (shared / _COMPLETE).exists():
+            shutil.copytree(folder, shared, ignore=shutil.ignore_patterns(_COMPLETE), dirs_exist_ok=True)
+            (shared / _COMPLETE).touch()
+        for place in (folder.parent, shared.parent):
+            for older in sorted(place.glob("kinertia-*/"), key=lambda path: path.stat().st_mtime)[:-_KEPT]:
+                shutil.rmtree(older, ignore_errors=True)
 
 
 def _user_cache() -> Path:
@@ -141,20 +150,37 @@ def _writable(folder: Path) -> bool:
         return False
 
 
-@contextmanager
-def _kept_in(folder: Path) -> Iterator[None]:
-    """Set Numba's folder while it decorates a function; functions of other packages keep their folder."""
-    from numba.core import config
+class _InFolder:
+    """Tells Numba that a function is kept in `cache_folder`, whose name stands for its source.
 
-    before, config.CACHE_DIR = config.CACHE_DIR, str(folder)
-    try:
-        yield
-    finally:
-        config.CACHE_DIR = before
+    Args:
+        line: of the function in its file.
+    """
+
+    def __init__(self, line: int) -> None:
+        self.line = line
+
+    @classmethod
+    def from_function(cls, function: Callable[..., Any], _file: str) -> "_InFolder":
+        return cls(function.__code__.co_firstlineno)
+
+    def get_cache_path(self) -> str:
+        return str(cache_folder())
+
+    def ensure_cache_path(self) -> None:
+        cache_folder().mkdir(parents=True, exist_ok=True)
+
+    def get_source_stamp(self) -> str:
+        return ""
+
+    def get_disambiguator(self) -> str:
+        return str(self.line)
 
 
 class _MachineCode(CompileResultCacheImpl):  # type: ignore[misc]
     """Serialised form of a compiled function."""
+
+    _locator_classes = (_InFolder,)
 
     def reduce(self, result: Any) -> tuple[Any, ...]:
         """Serialise as Numba does, but with only the name by which Python calls the code, and without what nobody looks
