@@ -28,7 +28,7 @@ from kinertia.report.comparison.side_by_side import (
     remarks,
     render_comparison,
 )
-from kinertia.report.comparison.what_changed import Comparison, compared_sessions, fit_of
+from kinertia.report.comparison.what_changed import Comparison, compared_sessions, fit_of, opened
 from kinertia.report.comparison.what_changed import compare as compare_sessions
 from kinertia.report.exports.c3d_results import write_c3d_results
 from kinertia.report.exports.files import write_columns, write_draws
@@ -67,19 +67,23 @@ def compare(
     kinertia compare before/subject.toml after/subject.toml -o comparison
     kinertia compare subject.toml --conditions normal "toe out"
     """
+    absent = [str(path) for path in results if not path.exists()]
+    if conditions is not None and (absent or len(results) > 2):
+        taken = f"here {conditions[0]!r} and {conditions[1]!r}; sessions are then {', '.join(map(str, results))}"
+        raise typer.BadParameter(f"--conditions takes two names, {taken}: give one or two that exist")
     if conditions is not None and len(results) == 1:
         return _compare_conditions(results[0], conditions, norms, output, overwrite)
-    if conditions is not None and len(results) > 2:
-        raise typer.BadParameter("with --conditions, give one session, or two")
     if not 2 <= len(results) <= MOST_FITS:
-        raise typer.BadParameter(f"give 2 to {MOST_FITS} folders of results; these are {len(results)}")
+        one = "; of one session, --conditions compares two conditions" if len(results) < 2 else ""
+        raise typer.BadParameter(f"give 2 to {MOST_FITS} subject files or results; these are {len(results)}{one}")
     paths = [path.resolve() for path in results]
     if len(set(paths)) < len(paths):
-        raise typer.BadParameter("the same folder is given twice")
+        raise typer.BadParameter("the same file or folder is given twice; for two conditions in it give it once")
     results_folder(output, overwrite)
     names = names_from_common_folder(paths)
+    sources = opened(paths, conditions)
     with shown_progress() as progress:
-        fits = {name: fit_of(path, progress) for name, path in zip(names, paths, strict=True)}
+        fits = {name: fit_of(source, progress) for name, source in zip(names, sources, strict=True)}
         found, reason = compared_sessions(list(fits.values()), conditions, progress, norms)
     page = render_comparison(fits, None if found is None else found.shown(), reason)
     with complete_folder(output, "compare") as work:

@@ -11,14 +11,19 @@ from kinertia.estimation.changes.change import NOTABLE, profile_changes, speed_c
 from kinertia.estimation.result.gait_scores import with_norms
 from kinertia.io.norms_file import Norm
 from kinertia.motion.model_outputs import CLINICAL_ANGLES
-from kinertia.report.comparison.change_tables import speed_sentence
+from kinertia.report.comparison.change_tables import change_rows, speed_sentence
 
 
 @pytest.fixture
 def walks(monkeypatch):
     """Walks of which the speed of each stride is stated."""
     monkeypatch.setattr(change, "_speeds", lambda trial: np.array(trial.speeds, dtype=float))
-    return lambda *speeds: [SimpleNamespace(speeds=speed) for speed in speeds]
+
+    def made(*speeds, belt=None):
+        kinematics = SimpleNamespace(trial=SimpleNamespace(belt=belt))
+        return [SimpleNamespace(speeds=speed, kinematics=kinematics) for speed in speeds]
+
+    return made
 
 
 def test_strides_of_one_walk_are_no_repeats(walks):
@@ -30,10 +35,21 @@ def test_strides_of_one_walk_are_no_repeats(walks):
     assert found.mdc95 == pytest.approx(4.303 * found.sd, rel=1e-3), "2 degrees of freedom"
 
 
-def test_one_walk_counts_its_strides(walks):
-    found = speed_change(walks([1.0, 1.02, 0.98]), walks([1.5, 1.52, 1.48]))
+def test_one_walk_on_a_treadmill_counts_its_strides(walks):
+    found = speed_change(*(walks([v, v + 0.02, v - 0.02], belt="a belt") for v in (1.0, 1.5)))
     assert (found.strides, found.verdict) == ((3, 3), "changed")
     assert "Moments change with speed" in speed_sentence(found)
+
+
+def test_strides_of_one_walk_over_ground_do_not_show_how_walks_differ(walks):
+    """Overlapping strides of one walk are alike; another walk of the same day differs more."""
+    found = speed_change(walks([1.0, 1.02, 0.98]), walks([1.1, 1.12, 1.08]))
+    assert (found.strides, found.verdict) == ((1, 1), "cannot be judged")
+    (row,) = change_rows([found])
+    assert row["needed"] == "–"
+    assert found.walks_needed(0.1) is None
+    mixed = speed_change(walks([1.0] * 3, belt="a belt"), walks([1.1] * 3))
+    assert mixed.verdict == "cannot be judged"
 
 
 def test_a_difference_that_cannot_be_judged_is_still_pointed_out(walks):

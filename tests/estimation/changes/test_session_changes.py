@@ -11,8 +11,17 @@ import kinertia
 from command_line import run
 from kinertia.errors import KinertiaError
 from kinertia.estimation.changes import session_changes as module
-from kinertia.estimation.changes.session_changes import session, unjudged_changes, why_incomparable, why_unjudged
+from kinertia.estimation.changes.session_changes import (
+    identity_note,
+    instrument_doubts,
+    session,
+    unjudged_changes,
+    why_incomparable,
+    why_unjudged,
+)
 from kinertia.estimation.changes.stride_features import _CONTACTS, CONTACT_SD_S, _Strides
+from kinertia.findings.finding import Severity, finding
+from kinertia.findings.quantity import Quantity, Where
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.report.comparison.what_changed import compare
 from kinertia.report.exports.saved_fit import write_fit
@@ -187,8 +196,37 @@ def test_what_cannot_be_compared_says_why(sessions, two_level):
     assert "two-level" in why_incomparable(before, two_level)
     heavy = replace(after, subject=after.subject.model_copy(update={"mass_kg": 2.0 * after.mass_kg}))
     assert "one person" in why_incomparable(before, heavy)
+    sex = {"male": "female", "female": "male"}[after.subject.sex]
+    other = replace(after, subject=after.subject.model_copy(update={"sex": sex}))
+    assert "male" in why_incomparable(before, other)
+    unknown = replace(after, subject=after.subject.model_copy(update={"sex": None}))
+    assert not why_incomparable(before, unknown)
     with pytest.raises(KinertiaError, match="same recording"):
         compare(before, before)
+
+
+def test_whether_both_are_one_person_is_asked_where_mass_or_legs_differ(sessions):
+    before, after = sessions
+    assert not identity_note(before, after)
+    for share, asked in ((0.92, False), (1.2, True)):
+        mass = replace(after, subject=after.subject.model_copy(update={"mass_kg": share * before.mass_kg}))
+        assert not why_incomparable(before, mass)
+        assert ("kg" in identity_note(before, mass)) is asked
+    for share, asked in ((1.03, False), (1.08, True)):
+        joints = tuple(replace(joint, translation=share * joint.translation) for joint in after.skeleton.joints)
+        longer = replace(after, skeleton=replace(after.skeleton, joints=joints))
+        assert ("egs of" in identity_note(before, longer)) is asked
+
+
+def test_trials_without_a_step_are_not_compared(sessions):
+    """Squats and jumps have no phases between contacts of both feet."""
+    standing = []
+    for trial in sessions[0].trials:
+        vars(still := replace(trial))["strides"] = ()
+        vars(still)["phases"] = ()
+        standing.append(still)
+    with pytest.raises(KinertiaError, match="before 0, before 1, before 2"):
+        session(replace(sessions[0], trials=tuple(standing)))
 
 
 def test_a_session_of_several_conditions_needs_a_choice(sessions):
@@ -247,3 +285,56 @@ def test_python_compares_what_the_command_does(sessions):
         found = kinertia.compare(*sessions, conditions=("before", "after"))
     assert len(found.outcomes) > 50
     assert found.speed.difference == pytest.approx(0.0, abs=1e-9)
+
+
+def zero(trial):
+    where = Where(trial=trial, plate="plate 1", axis="vertical", file_axis="Y")
+    return finding("P213", where, level_n=Quantity(-23.1, "N", limit=15.0))
+
+
+@pytest.fixture(scope="module")
+def doubled(fit):
+    """A walk that was recorded twice, without findings."""
+    (trial,) = fit.trials
+
+    def named(name):
+        return replace(trial, kinematics=replace(trial.kinematics, trial=replace(trial.kinematics.trial, name=name)))
+
+    return replace(fit, trials=(named("first"), named("second")), findings=())
+
+
+def doubt(fit, *findings):
+    doubted = replace(fit, findings=findings)
+    return instrument_doubts((doubted, doubted.trials[:1]), (doubted, doubted.trials[1:])).get("r", "")
+
+
+def test_an_error_of_one_condition_is_none_of_both(doubled):
+    assert doubt(doubled) == ""
+    assert doubt(doubled, zero("first")).startswith("P213")
+    assert doubt(doubled, zero("first"), zero("second")) == ""
+    assert doubt(doubled, zero("third")) == ""
+
+
+def test_errors_of_both_that_a_user_waived_remain(doubled):
+    both = [replace(zero(trial).at(Severity.ERROR), status="waived") for trial in ("first", "second")]
+    assert doubt(doubled, *both).startswith("P213")
+
+
+def test_what_is_corrected_explained_or_ignored_is_none(doubled):
+    assert doubt(doubled, zero("first").at(Severity.CORRECTED)) == ""
+    assert doubt(doubled, zero("first").muted("P201")) == ""
+    assert doubt(doubled, replace(zero("first"), status="ignored")) == ""
+
+
+def test_sessions_have_errors_of_their_own(doubled):
+    days = [replace(doubled, findings=(zero(name),)) for name in ("first", "second")]
+    found = instrument_doubts((days[0], days[0].trials[:1]), (days[1], days[1].trials[1:]))
+    assert set(found) == {"r", "l", ""}
+    assert found["l"].startswith("P213")
+
+
+def test_a_foot_beside_its_plate_leaves_the_other_leg(doubled):
+    where = Where(trial="first", plate="plate 1")
+    beside = finding("P282", where, foot=Quantity("right"), overhang_m=Quantity(0.05, "m"))
+    doubted = replace(doubled, findings=(beside,))
+    assert set(instrument_doubts((doubted, doubted.trials[:1]), (doubted, doubted.trials[1:]))) == {"r"}

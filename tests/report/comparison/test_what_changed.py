@@ -1,62 +1,141 @@
-"""Which findings about instruments keep a change of moments from being judged."""
+"""What is compared is read, and refused, before anything is estimated; what limits a comparison is stated."""
 
-from dataclasses import replace
+import json
+from types import SimpleNamespace
 
 import pytest
 
-from kinertia.findings.finding import Severity, finding
-from kinertia.findings.quantity import Quantity, Where
-from kinertia.report.comparison.what_changed import instrument_doubts
+import kinertia
+from command_line import run
+from kinertia.errors import FileError, KinertiaError
+from kinertia.estimation.changes.change import PRIMARY, Change
+from kinertia.estimation.result.fit import Fit
+from kinertia.io.subject.tables import SubjectFile
+from kinertia.report.comparison import what_changed
+from kinertia.report.comparison.change_tables import change_columns, changes_summary, lacking_sentence
+from kinertia.report.comparison.what_changed import opened
 
 
-def zero(trial):
-    where = Where(trial=trial, plate="plate 1", axis="vertical", file_axis="Y")
-    return finding("P213", where, level_n=Quantity(-23.1, "N", limit=15.0))
+@pytest.fixture
+def write(tmp_path, monkeypatch):
+    """Writes subject files that state these conditions; nothing may be estimated from them."""
+
+    def never(*_):
+        raise AssertionError("an estimate was begun")
+
+    monkeypatch.setattr(what_changed, "fit_subject", never)
+    monkeypatch.setattr(what_changed, "fit_session", never)
+
+    (tmp_path / "static.trc").write_text("markers")
+
+    def written(name, *conditions, content=None, sex="male"):
+        lines = ["[subject]", f'sex = "{sex}"', "mass_kg = 70.0", "height_m = 1.75", "[model]", 'static = "static.trc"']
+        for k, condition in enumerate(conditions):
+            file = f"{name} {k}.trc" if content is None else f"{content} {k}.trc"
+            (tmp_path / file).write_text(f"markers of {file}")
+            (tmp_path / "forces.mot").write_text("forces")
+            lines += ["[[trial]]", f'markers = "{file}"', 'forces = "forces.mot"']
+            lines += [f'condition = "{condition}"'] if condition else []
+        path = tmp_path / f"{name}.toml"
+        path.write_text("\n".join(lines))
+        return path
+
+    return written
 
 
-@pytest.fixture(scope="module")
-def twice(fit):
-    """A walk that was recorded twice, without findings."""
-    (trial,) = fit.trials
-
-    def named(name):
-        return replace(trial, kinematics=replace(trial.kinematics, trial=replace(trial.kinematics.trial, name=name)))
-
-    return replace(fit, trials=(named("first"), named("second")), findings=())
-
-
-def doubt(fit, *findings):
-    doubted = replace(fit, findings=findings)
-    return instrument_doubts((doubted, doubted.trials[:1]), (doubted, doubted.trials[1:])).get("r", "")
-
-
-def test_an_error_of_one_condition_is_none_of_both(twice):
-    assert doubt(twice) == ""
-    assert doubt(twice, zero("first")).startswith("P213")
-    assert doubt(twice, zero("first"), zero("second")) == ""
-    assert doubt(twice, zero("third")) == ""
+def test_conditions_are_looked_for_before_anything_is_estimated(write):
+    path = write("Anna", "normal", "toe out")
+    for conditions, named in (
+        (("normal", "toe-out"), "'toe out'"),
+        (("normal", "normal"), "choose two"),
+        (("normal", "quite another"), "stated are: normal, toe out"),
+    ):
+        with pytest.raises(KinertiaError, match=named):
+            kinertia.compare(path, conditions=conditions)
+    with pytest.raises(KinertiaError, match=r"\[\[trial\]\]"):
+        kinertia.compare(write("Ben", "", ""), conditions=("normal", "toe out"))
+    with pytest.raises(KinertiaError, match="choose by --conditions"):
+        kinertia.compare(path, write("later", "normal"))
+    with pytest.raises(KinertiaError, match="no trial of"):
+        kinertia.compare(path, write("latest", "normal"), conditions=("toe out", "toe out"))
+    (source,) = opened([path], ("normal", "toe out"))
+    assert isinstance(source, SubjectFile)
 
 
-def test_errors_of_both_that_a_user_waived_remain(twice):
-    both = [replace(zero(trial).at(Severity.ERROR), status="waived") for trial in ("first", "second")]
-    assert doubt(twice, *both).startswith("P213")
+def test_subject_files_with_a_recording_in_common_are_refused(write):
+    first, other = write("first", "", ""), write("other", "", content="first")
+    with pytest.raises(FileError) as error:
+        opened([first, other], None)
+    assert error.value.path.name == "first 0.trc"
+    with pytest.raises(KinertiaError, match="male and female"):
+        opened([first, write("another", "", sex="female")], None)
 
 
-def test_what_is_corrected_explained_or_ignored_is_none(twice):
-    assert doubt(twice, zero("first").at(Severity.CORRECTED)) == ""
-    assert doubt(twice, zero("first").muted("P201")) == ""
-    assert doubt(twice, replace(zero("first"), status="ignored")) == ""
+def test_a_folder_of_results_or_with_a_subject_file_is_found(write, tmp_path, demo_run):
+    path = write("subject", "")
+    results = demo_run[1]
+    found = opened([tmp_path, results], None)
+    assert isinstance(found[0], SubjectFile)
+    assert isinstance(found[1], Fit)
+    assert isinstance(opened([results / "fit.npz", path], None)[0], Fit)
+    with pytest.raises(FileError, match="kinertia init"):
+        opened([tmp_path / "subject 0.trc", path], None)
 
 
-def test_sessions_have_errors_of_their_own(twice):
-    days = [replace(twice, findings=(zero(name),)) for name in ("first", "second")]
-    found = instrument_doubts((days[0], days[0].trials[:1]), (days[1], days[1].trials[1:]))
-    assert set(found) == {"r", "l", ""}
-    assert found["l"].startswith("P213")
+def test_the_command_says_what_to_give_instead(write, tmp_path):
+    path = write("Anna", "normal", "toe out")
+    for arguments, named in (
+        ((path,), "--conditions"),
+        ((path, path), "give it once"),
+        ((path, "toe in", "--conditions", "normal", "toe out"), "--conditions takes two names"),
+        ((path, "--conditions", "normal"), "--conditions takes two names, here 'normal' and '-o'"),
+        ((path, tmp_path / "nobody.toml"), "F101"),
+    ):
+        outcome = run("compare", *arguments, "-o", tmp_path / "c", "--json")
+        assert outcome.status == 2
+        assert named in json.loads(outcome.out)["error"]
+        assert not (tmp_path / "c").exists()
 
 
-def test_a_foot_beside_its_plate_leaves_the_other_leg(twice):
-    where = Where(trial="first", plate="plate 1")
-    beside = finding("P282", where, foot=Quantity("right"), overhang_m=Quantity(0.05, "m"))
-    doubted = replace(twice, findings=(beside,))
-    assert set(instrument_doubts((doubted, doubted.trials[:1]), (doubted, doubted.trials[1:]))) == {"r"}
+def changed(side, wanted, p=0.5, difference=0.0):
+    quantity, joint, component, event = wanted
+    named = quantity, joint, component, side, event, "N m/kg"
+    return Change(
+        *named,
+        0.3,
+        0.3 + difference,
+        (3, 3),
+        0.02,
+        dict.fromkeys(("instruments", "body", "markers"), 0.0) | {"stride": 0.02},
+        0.05,
+        p,
+        (0.03, 0.03),
+    )
+
+
+def test_a_leg_whose_moments_are_not_known_is_named():
+    right = [changed("r", wanted) for wanted in PRIMARY]
+    assert lacking_sentence([*right, *(changed("l", wanted) for wanted in PRIMARY)]) == ""
+    assert "left knee adduction (mid-stance, late stance) and ankle flexion (push-off)" in lacking_sentence(right)
+    assert "right" not in lacking_sentence(right)
+    some = [*right, changed("l", PRIMARY[0])]
+    assert "mid-stance" not in lacking_sentence(some)
+
+
+def test_each_outcome_says_whether_it_remains_among_many():
+    """Primary outcomes are judged alone; of the others 0.03 fails beside three that show nothing."""
+    others = [("moment", "hip", "flexion", event) for event in ("loading", "mid-stance", "late stance", "push-off")]
+    found = [changed("r", PRIMARY[0], 0.01, 0.2)]
+    found += [changed("r", wanted, p) for wanted, p in zip(others, (0.001, 0.03, 0.6, 0.7), strict=True)]
+    expected = [None, True, False, False, False]
+    assert change_columns(found)["discovered"] == expected
+    assert [row["discovered"] for row in changes_summary("a", "b", found, None, ())["outcomes"]] == expected
+
+
+def test_tasks_that_differ_are_noted():
+    def walks(*tasks):
+        return [SimpleNamespace(kinematics=SimpleNamespace(trial=SimpleNamespace(task=task))) for task in tasks]
+
+    assert what_changed._tasks_note((walks("walk", "walk"), walks("walk"))) == ""
+    assert "walk before, turn after" in what_changed._tasks_note((walks("walk"), walks("turn")))
+    assert "turn and walk" in what_changed._tasks_note((walks("walk", "turn"), walks("turn", "walk")))

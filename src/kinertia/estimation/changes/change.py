@@ -189,12 +189,12 @@ GPS = Measure("gps", "gait profile", "score", "degrees", sided=True)
 def profile_changes(
     before: Sequence[TrialFit], after: Sequence[TrialFit], norms: Mapping[str, Norm]
 ) -> tuple[Change, ...]:
-    """Compare the Gait Profile Score of each side between strides, each walk counted once as in `speed_change`."""
+    """Compare the Gait Profile Score of each side, each walk counted once as in `speed_change`."""
     tables = [[_stride_scores(trial, norms) for trial in trials] for trials in (before, after)]
     found = []
     for side in ("r", "l"):
         known = [[scores for table in some if (scores := _values(table, GPS, side)).size] for some in tables]
-        found.append(_change(GPS, side, known))
+        found.append(_change(GPS, side, known, _on_belts(before, after)))
     return tuple(change for change in found if change is not None)
 
 
@@ -210,14 +210,14 @@ def _stride_scores(trial: TrialFit, norms: Mapping[str, Norm]) -> dict[str, list
 def speed_change(before: Sequence[TrialFit], after: Sequence[TrialFit]) -> Change | None:
     """Compare walking speed, with each walk counted once (strides of one walk are alike); None where it is not known.
 
-    One walk against one on a treadmill counts strides instead.
+    Where all walk on a treadmill, and one of them once, strides count instead.
     """
     known = [[speeds for trial in trials if (speeds := _speeds(trial)).size] for trials in (before, after)]
-    return _change(Measure("speed_m_s", "walking", "speed", "m/s"), "", known)
+    return _change(Measure("speed_m_s", "walking", "speed", "m/s"), "", known, _on_belts(before, after))
 
 
 def gait_changes(before: Sequence[TrialFit], after: Sequence[TrialFit]) -> tuple[Change, ...]:
-    """Compare MEASURES between strides, each walk counted once as in `speed_change`; those that are known."""
+    """Compare MEASURES, each walk counted once as in `speed_change`; those that are known."""
     tables = [[spatiotemporal_columns([trial]) for trial in trials] for trials in (before, after)]
     found = []
     for measure in MEASURES:
@@ -225,7 +225,7 @@ def gait_changes(before: Sequence[TrialFit], after: Sequence[TrialFit]) -> tuple
             known = [
                 [of_table for table in some if (of_table := _values(table, measure, side)).size] for some in tables
             ]
-            found.append(_change(measure, side, known))
+            found.append(_change(measure, side, known, _on_belts(before, after)))
     return tuple(change for change in found if change is not None)
 
 
@@ -235,11 +235,15 @@ def _values(table: dict[str, list[object]], measure: Measure, side: str) -> np.n
     return np.asarray(values[usable])
 
 
-def _change(measure: Measure, side: str, known: Sequence[Sequence[np.ndarray]]) -> Change | None:
+def _on_belts(before: Sequence[TrialFit], after: Sequence[TrialFit]) -> bool:
+    return all(trial.kinematics.trial.belt is not None for trial in (*before, *after))
+
+
+def _change(measure: Measure, side: str, known: Sequence[Sequence[np.ndarray]], on_belts: bool) -> Change | None:
     """Compare the values of each walk of both conditions."""
     if not all(known):
         return None
-    alone = min(map(len, known)) < 2
+    alone = on_belts and min(map(len, known)) < 2
     values = [
         np.concatenate(samples) if alone else np.array([sample.mean() for sample in samples]) for samples in known
     ]

@@ -11,8 +11,9 @@ features, which count for at most SHRINK degrees of freedom. A change is shown w
 deviations, with degrees of freedom by Satterthwaite (1946, Biometrics Bulletin 2:110).
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import TypeVar
 
 import numpy as np
@@ -65,6 +66,46 @@ def conditions_of(fit: Fit) -> dict[str, list[str]]:
     return result
 
 
+def condition_among(stated: Collection[str], person: str, wanted: str | None) -> str:
+    """Return the condition that is compared: the wanted one, or the only one that a person's trials state.
+
+    Args:
+        stated: conditions of all trials, "" where none is stated.
+        person: whose trials they are.
+        wanted: by the user; None if all trials should state the same.
+
+    Raises:
+        KinertiaError: no trial states it, or trials state several and none is wanted.
+
+    Examples:
+        >>> condition_among(["normal", "toe out"], "Anna", "toe-out")
+        Traceback (most recent call last):
+        ...
+        kinertia.errors.KinertiaError: no trial of Anna has the condition 'toe-out'; stated are: normal, toe out \
+(nearest: 'toe out')
+    """
+    known = sorted({condition for condition in stated if condition})
+    if wanted is None and len(set(stated)) == 1:
+        return next(iter(stated))
+    if wanted is None:
+        names = ", ".join(repr(name) for name in sorted(set(stated)))
+        raise KinertiaError(f"trials of {person} state several conditions ({names}): choose by --conditions")
+    if wanted in stated:
+        return wanted
+    if not known:
+        problem = f"state it in the subject file, as condition = {wanted!r} under each [[trial]]; stated are: none"
+        raise KinertiaError(f"no trial of {person} has the condition {wanted!r}: {problem}")
+    near = get_close_matches(wanted, known, n=1, cutoff=0.5)
+    hint = f" (nearest: {near[0]!r})" if near else ""
+    raise KinertiaError(f"no trial of {person} has the condition {wanted!r}; stated are: {', '.join(known)}{hint}")
+
+
+def expect_two(before: str, after: str) -> None:
+    """Raise an error unless these are two conditions."""
+    if before == after:
+        raise KinertiaError(f"both conditions are {before!r}; choose two")
+
+
 def condition_features(
     fit: Fit, before: str, after: str, progress: Callable[[float], None] = lambda share: None
 ) -> tuple[StrideFeatures, dict[str, str]]:
@@ -78,13 +119,9 @@ def condition_features(
     Raises:
         KinertiaError: no trial states one of the conditions, both are the same, or the fit has no posterior draws.
     """
-    if before == after:
-        raise KinertiaError(f"both conditions are {before!r}; choose two")
-    known = conditions_of(fit)
+    expect_two(before, after)
     for wanted in (before, after):
-        if wanted not in known:
-            stated = ", ".join(sorted(filter(None, known))) or "none"
-            raise KinertiaError(f"no trial has the condition {wanted!r}; stated are: {stated}")
+        condition_among(conditions_of(fit), fit.subject.name, wanted)
     chosen = tuple(trial for trial in fit.trials if trial.kinematics.trial.condition in (before, after))
     condition = {trial.name: trial.kinematics.trial.condition for trial in chosen}
     found = stride_features(fit, chosen, usual_sources(fit), min(DRAWS, kept_draws(fit).count), progress)

@@ -11,9 +11,10 @@ Deviations of a fit whose axes of knees and ankles were fixed are too short for 
 lengthened (`_FIXED_AXES`).
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Protocol
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from kinertia.estimation.changes.change import SOURCES, UNITS, Change, named_out
 from kinertia.estimation.changes.condition_changes import (
     DRAWS,
     Condition,
+    condition_among,
     conditions_by_outcome,
     conditions_of,
     judged,
@@ -39,7 +41,11 @@ from kinertia.estimation.result.drawn_fit import kept_draws
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import PosteriorDraws
+from kinertia.findings.finding import Finding, Severity
+from kinertia.model.anatomy import segment_of
 from kinertia.model.gait27 import AXIS_TILTS
+from kinertia.settings import Subject
+from kinertia.trial.data import FEET
 
 _FIXED_AXES = 1.6
 """Factor on deviations due to markers: with fixed axes they covered 78 to 83 % of synthetic sessions, where 4 degrees
@@ -47,8 +53,18 @@ were their axes' error."""
 _BY_AXES = ("moment ankle", "moment subtalar", "angle hip_rotation", "angle knee", "angle ankle", "angle subtalar")
 NARROW_M = 0.006
 """Largest SD of a marker's position in a fit of one session alone, with a prior of 5 mm; as one of two it has 10 mm."""
-_LIGHTER = 0.1
-"""Relative difference of mass beyond which results are hardly of one person."""
+_LIGHTER, _LONGER = 0.1, 0.05
+"""Relative differences of mass, and of legs, beyond which it is asked whether results are of one person. Markers put on
+anew change legs by 2 %."""
+_OTHER_PERSON = 1.5
+"""Ratio of masses beyond which results are hardly of one person: a child takes years to gain as much."""
+
+_INSTRUMENTS = ("P", "T")
+_LEFT_OUT = frozenset({"P271", "P272", "P276", "P278", "P279", "P280", "P281", "P283", "P290"})
+"""Codes of loads that are not known: moments have gaps there."""
+_MILD = frozenset({"P105", "P106", "P107", "P108"})
+"""Codes of noise and resolution, which joint moments of whole phases hardly show."""
+Trials = Sequence[TrialFit]
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,16 +100,21 @@ def session(fit: Fit, condition: str | None = None) -> Session:
         condition: of the trials; None if all state the same.
 
     Raises:
-        KinertiaError: no trial has the condition, or they state several and none is chosen.
+        KinertiaError: no trial has the condition, they state several and none is chosen, or none shows a step.
     """
-    known = conditions_of(fit)
-    stated = ", ".join(repr(name) for name in sorted(known))
-    if condition is None and len(known) > 1:
-        raise KinertiaError(f"trials of {fit.subject.name} state several conditions ({stated}): choose by --conditions")
-    chosen = next(iter(known)) if condition is None else condition
-    if chosen not in known:
-        raise KinertiaError(f"no trial of {fit.subject.name} has the condition {chosen!r}; stated are: {stated}")
-    return Session(fit, chosen, tuple(trial for trial in fit.trials if trial.kinematics.trial.condition == chosen))
+    chosen = condition_among(conditions_of(fit), fit.subject.name, condition)
+    trials = tuple(trial for trial in fit.trials if trial.kinematics.trial.condition == chosen)
+    if not any(_steps(trial) for trial in trials):
+        names = ", ".join(trial.name for trial in trials)
+        raise KinertiaError(
+            f"{names} of {fit.subject.name}: no stride or stance is seen, and changes are compared between contacts of "
+            "the feet; give walks or runs"
+        )
+    return Session(fit, chosen, trials)
+
+
+def _steps(trial: TrialFit) -> bool:
+    return any(stride.phase != "landing" for stride in (*trial.strides, *trial.phases))
 
 
 def why_incomparable(before: Fit, after: Fit) -> str:
@@ -103,11 +124,56 @@ def why_incomparable(before: Fit, after: Fit) -> str:
             kept_draws(fit)
         except KinertiaError as error:
             return str(error)
-    if _recordings(before) & _recordings(after):
-        return "both results are from the same recording, so nothing can have changed between them"
-    if abs(before.mass_kg / after.mass_kg - 1.0) > _LIGHTER:
+    both = _recordings(before), _recordings(after)
+    if same := sorted(both[0][content] for content in both[0].keys() & both[1].keys()):
+        return f"{', '.join(same)}: both are from the same recording, so nothing can have changed between them"
+    if reason := other_sex(before, after):
+        return reason
+    ratio = after.mass_kg / before.mass_kg
+    if not 1.0 / _OTHER_PERSON < ratio < _OTHER_PERSON:
         return f"masses of {before.mass_kg:.1f} and {after.mass_kg:.1f} kg are hardly of one person"
     return ""
+
+
+class _OfPerson(Protocol):
+    @property
+    def subject(self) -> Subject:
+        """Who it is."""
+
+
+def other_sex(before: _OfPerson, after: _OfPerson) -> str:
+    """State that two results, or subject files, are of people of different sex; empty if not, or if it is not known."""
+    sexes = before.subject.sex, after.subject.sex
+    if None in sexes or len(set(sexes)) == 1:
+        return ""
+    return f"{sexes[0]} and {sexes[1]} are not the sex of one person: correct it in one of both"
+
+
+def identity_note(before: Fit, after: Fit) -> str:
+    """Ask whether both results are of one person, if mass or legs differ as of two, or of one who grew; else empty."""
+    masses, legs = (before.mass_kg, after.mass_kg), (_leg_m(before), _leg_m(after))
+    found = []
+    if abs(masses[1] / masses[0] - 1.0) > _LIGHTER:
+        found.append(f"masses of {masses[0]:.1f} and {masses[1]:.1f} kg")
+    if abs(legs[1] / legs[0] - 1.0) > _LONGER:
+        found.append(f"legs of {100.0 * legs[0]:.0f} and {100.0 * legs[1]:.0f} cm")
+    if not found:
+        return ""
+    text = " and ".join(found)
+    return f"{text[0].upper()}{text[1:]}: is it one person? If not, ignore what follows."
+
+
+def _leg_m(fit: Fit) -> float:
+    """Return the mean length of both legs from hip to ankle, m; NaN where the model lacks a part of both."""
+    origins = fit.skeleton.neutral.translation[0]
+    segments = [segment_of(name) for name in fit.skeleton.segments]
+    lengths = []
+    for side in FEET:
+        parts = [f"{part}_{side}" for part in ("thigh", "shank", "foot")]
+        if set(parts) <= set(segments):
+            joints = origins[[segments.index(part) for part in parts]]
+            lengths.append(float(np.linalg.norm(np.diff(joints, axis=0), axis=1).sum()))
+    return float(np.mean(lengths)) if lengths else np.nan
 
 
 def why_unjudged(before: Fit, after: Fit) -> str:
@@ -218,5 +284,49 @@ def _variance(condition: Condition, source: str) -> float:
     return float(np.var(condition.drawn[source], ddof=1))
 
 
-def _recordings(fit: Fit) -> set[bytes]:
-    return {trial.kinematics.trial.markers.positions.tobytes() for trial in fit.trials}
+def _recordings(fit: Fit) -> dict[bytes, str]:
+    return {trial.kinematics.trial.markers.positions.tobytes(): trial.name for trial in fit.trials}
+
+
+def instrument_doubts(before: tuple[Fit, Trials], after: tuple[Fit, Trials]) -> dict[str, str]:
+    """State the findings that keep changes of moments from being judged, by side of the leg: codes and messages.
+
+    Args:
+        before, after: fit and trials of each condition; of one session, the same fit.
+    """
+    by_side = [_findings(*compared) for compared in (before, after)]
+    if before[0] is after[0]:
+        everywhere = {_kind(finding) for finding in by_side[0]} & {_kind(finding) for finding in by_side[1]}
+        by_side = [
+            [finding for finding in some if finding.severity is Severity.ERROR or _kind(finding) not in everywhere]
+            for some in by_side
+        ]
+    doubts: dict[str, dict[str, str]] = {}
+    for finding in (*by_side[0], *by_side[1]):
+        for side in _sides(finding):
+            doubts.setdefault(side, {})[finding.code] = f"{finding.code}: {finding.message}"
+    return {side: " ".join(said.values()) for side, said in doubts.items()}
+
+
+def _sides(finding: Finding) -> tuple[str, ...]:
+    """Return the sides whose loads a finding is about: that of a foot which it names, or all."""
+    foot = finding.evidence.get("foot")
+    return {"right": ("r",), "left": ("l",)}.get("" if foot is None else str(foot.value), ("r", "l", ""))
+
+
+def _findings(fit: Fit, trials: Trials) -> list[Finding]:
+    names = {trial.name for trial in trials}
+    return [
+        finding
+        for finding in fit.findings
+        if finding.code.startswith(_INSTRUMENTS)
+        and finding.severity >= Severity.WARNING
+        and finding.code not in _LEFT_OUT | _MILD
+        and finding.muted_by is None
+        and finding.status != "ignored"
+        and finding.where.trial in (None, *names)
+    ]
+
+
+def _kind(finding: Finding) -> tuple[str, str | None, str | None]:
+    return finding.code, finding.where.plate, finding.where.axis

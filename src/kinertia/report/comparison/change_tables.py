@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.estimation.changes.change import MOST_WALKS, NOTABLE, PRIMARY, SOURCES, Change, GroupChange
+from kinertia.estimation.changes.change import MOST_WALKS, NOTABLE, PRIMARY, SOURCES, Change, GroupChange, Names
 from kinertia.estimation.changes.curve_changes import CurveChange
 from kinertia.report.figures.cycle_figures import band, mean_line
 from kinertia.report.figures.figure import (
@@ -23,6 +23,7 @@ from kinertia.report.figures.figure import (
     written,
 )
 from kinertia.report.wording import INTERVAL_SD
+from kinertia.trial.data import FEET
 from kinertia.trial.sampled_data import runs
 
 _DIGITS = {"N m/kg": 3, "degrees": 1, "m/s": 2, "steps/min": 1, "m": 3, "%": 1}
@@ -35,6 +36,8 @@ _JOINTS = {
     "angle": ("knee", "hip", "ankle", "subtalar", "pelvis", "lumbar"),
 }
 _OPACITY, _SHADE = 0.2, 0.12
+_MOST_NAMED = 4
+"""Other outcomes that are named in a sentence."""
 _PHASES = {"stride": "% of the gait cycle", "stance": "% of stance"}
 
 
@@ -43,9 +46,24 @@ def change_sentences(found: Sequence[Change]) -> Iterator[str]:
     for wanted in PRIMARY:
         for change in found:
             if (change.quantity, change.joint, change.component, change.event) == wanted:
-                side = f"{SIDES[change.side][0].capitalize()} " if change.side else ""
-                name = f"{side}{change.joint} {change.component} {change.quantity}"
-                yield f"{name} ({change.event}) {_judgement(change)}."
+                internal = "internal, " if change.quantity == "moment" else ""
+                yield f"{_with_side(change)} ({internal}{change.event}) {_judgement(change)}."
+
+
+def lacking_sentence(found: Sequence[Change]) -> str:
+    """State which outcomes that were named beforehand are not compared on one side; empty if all are, or none."""
+    known = {(change.side, change.quantity, change.joint, change.component, change.event) for change in found}
+    legs = []
+    for side in FEET:
+        events: dict[str, list[str]] = {}
+        for wanted in PRIMARY:
+            if (side, *wanted) not in known:
+                events.setdefault(f"{wanted[1]} {wanted[2]}", []).append(wanted[3])
+        named = [f"{name} ({', '.join(some)})" for name, some in events.items()]
+        legs += [f"{SIDES[side][0]} {' and '.join(named)}"] if named else []
+    if not legs:
+        return ""
+    return f"Not compared, since no step of one condition shows the moment: {'; '.join(legs)}."
 
 
 def speed_sentence(speed: Change | None) -> str:
@@ -79,11 +97,27 @@ def changed_sentence(found: Sequence[Change]) -> str:
     if not others:
         return "Nothing else can be judged."
     count = sum(change.verdict == "changed" for change in others)
-    remain = sum(discovered([change.p for change in others]))
+    kept = discoveries(found)
+    remaining = sorted((change for change in others if kept.get(change.names)), key=lambda change: change.p)
+    named = [f"{_with_side(change).lower()} ({change.event})" for change in remaining[:_MOST_NAMED]]
+    names = f": {', '.join(named)}{', ...' if remaining[_MOST_NAMED:] else ''}" if named else ""
     return (
         f"Of {len(others)} other moments and angles {count} changed; without any change about {0.05 * len(others):.0f} "
-        f"would seem to. At a false discovery rate of 5 %, {remain} remain."
+        f"would seem to. At a false discovery rate of 5 %, {len(remaining)} remain{names}."
     )
+
+
+def discoveries(found: Sequence[Change]) -> dict[Names, bool]:
+    """Decide of each outcome that can be judged, and was not named beforehand, whether it remains (`discovered`)."""
+    others = [change for change in found if not change.primary and np.isfinite(change.p) and not change.doubt]
+    remain = discovered([change.p for change in others])
+    return {change.names: remains for change, remains in zip(others, remain, strict=True)}
+
+
+def _with_side(change: Change) -> str:
+    side = f"{SIDES[change.side][0]} " if change.side else ""
+    text = f"{side}{outcome_words(change)}"
+    return text[0].upper() + text[1:]
 
 
 def limit_sentences(found: Sequence[Change], doubt: str) -> Iterator[str]:
@@ -113,6 +147,7 @@ def discovered(p: Sequence[float], rate: float = 0.05) -> list[bool]:
 def change_columns(found: Sequence[Change]) -> dict[str, list[Any]]:
     """Return the columns of `changes.csv`: a row per outcome, one column for each part of the standard deviation."""
     names = ("quantity", "joint", "component", "side", "event", "unit", "before", "after", "difference", "sd")
+    remaining = discoveries([change for change in found if change.quantity != "gait"])
     return {
         **{name: [getattr(change, name) for change in found] for name in names},
         **{f"sd_{source}": [change.sd_by_source[source] for change in found] for source in SOURCES},
@@ -122,6 +157,7 @@ def change_columns(found: Sequence[Change]) -> dict[str, list[Any]]:
         "walks_needed": [change.walks_needed(RELEVANT[change.unit]) for change in found],
         "mdc95": [change.mdc95 for change in found],
         "p": [change.p for change in found],
+        "discovered": [remaining.get(change.names) for change in found],
         "strides_before": [change.strides[0] for change in found],
         "strides_after": [change.strides[1] for change in found],
         "verdict": [change.verdict for change in found],
@@ -164,7 +200,7 @@ def change_rows(found: Sequence[Change]) -> list[dict[str, Any]]:
             "unit": change.unit,
             "verdict": change.verdict,
             "primary": change.primary,
-            "needed": change.walks_needed(RELEVANT[change.unit]) or f"over {MOST_WALKS}",
+            "needed": _needed(change),
             "cells": [_cell(change, value) for value in (change.before, change.after)]
             + [_cell(change, change.difference, "+")]
             + [
@@ -211,6 +247,12 @@ def outcome_words(outcome: Change | CurveChange | GroupChange) -> str:
     return f"{outcome.joint} {outcome.component}{quantity}".replace("_", " ")
 
 
+def _needed(change: Change) -> int | str:
+    if not np.isfinite(change.stride_sd).all():
+        return "–"
+    return change.walks_needed(RELEVANT[change.unit]) or f"over {MOST_WALKS}"
+
+
 def _cell(change: Change, value: float, sign: str = "") -> dict[str, Any]:
     known = bool(np.isfinite(value))
     return {"value": value if known else 0.0, "text": f"{value:{sign}.{_DIGITS[change.unit]}f}" if known else "–"}
@@ -220,7 +262,8 @@ def changes_summary(
     before: str, after: str, found: Sequence[Change], speed: Change | None, gait: Sequence[Change]
 ) -> dict[str, Any]:
     """Return what `kinertia compare --json` prints of changes."""
-    rows = [_summary(change) for change in found]
+    remaining = discoveries(found)
+    rows = [{**_summary(change), "discovered": remaining.get(change.names)} for change in found]
     return {
         "before": before,
         "after": after,

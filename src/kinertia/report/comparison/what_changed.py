@@ -9,16 +9,28 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from kinertia.errors import KinertiaError
+from kinertia.errors import FileError, KinertiaError
 from kinertia.estimation.changes.change import Change, gait_changes, group_changes, profile_changes, speed_change
-from kinertia.estimation.changes.condition_changes import changes_of_strides, condition_features, masks_of
+from kinertia.estimation.changes.condition_changes import (
+    changes_of_strides,
+    condition_among,
+    condition_features,
+    conditions_of,
+    expect_two,
+    masks_of,
+)
 from kinertia.estimation.changes.curve_changes import CurveChange, apart, curve_changes, paired, rows_of
 from kinertia.estimation.changes.session_changes import (
     Session,
+    Trials,
     changes_between,
+    identity_note,
+    instrument_doubts,
+    other_sex,
     session,
     session_features,
     unjudged_changes,
@@ -28,9 +40,9 @@ from kinertia.estimation.changes.session_changes import (
 from kinertia.estimation.prepared import Prepared, Progress
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.mean_cycles import check_convention, expect_all_nine
-from kinertia.estimation.result.trial_fit import TrialFit
-from kinertia.findings.finding import Finding, Severity
 from kinertia.io.norms_file import Norm, read_norms
+from kinertia.io.recording import MARKER_FILES
+from kinertia.io.subject.provenance import sha256
 from kinertia.io.subject.reader import read_subject
 from kinertia.io.subject.tables import SubjectFile
 from kinertia.report.comparison.change_tables import (
@@ -41,11 +53,12 @@ from kinertia.report.comparison.change_tables import (
     changes_summary,
     curve_figures,
     group_columns,
+    lacking_sentence,
     limit_sentences,
     person_columns,
     speed_sentence,
 )
-from kinertia.report.exports.saved_fit import load_fit
+from kinertia.report.exports.saved_fit import FIT_FILE, load_fit
 from kinertia.report.figures.coordinate_titles import same_sign
 from kinertia.report.pages.rendering import rendered
 from kinertia.workflow.estimate import estimate
@@ -54,16 +67,11 @@ from kinertia.workflow.from_files import fit_subject, prepare_subject
 if TYPE_CHECKING:
     import pandas as pd
 
-_INSTRUMENTS = ("P", "T")
-_LEFT_OUT = frozenset({"P271", "P272", "P276", "P278", "P279", "P280", "P281", "P283", "P290"})
-"""Codes of loads that are not known: moments have gaps there."""
-_MILD = frozenset({"P105", "P106", "P107", "P108"})
-"""Codes of noise and resolution, which joint moments of whole phases hardly show."""
 _NARROW = (
     "A result takes its markers as placed within 5 mm: between days, angles differ by more than its intervals allow. "
     "Give the subject files instead."
 )
-Trials = Sequence[TrialFit]
+Source = Fit | SubjectFile | str | Path
 MARKER_SD_M = 0.010
 """Of marker positions in their segments: 5 mm each, and 5 mm that markers of a segment share. As independent errors, 10
 mm leave the middle of three to five markers as uncertain as that; with 7 mm, intervals of hip and pelvis angles between
@@ -82,6 +90,7 @@ class Comparison:
         curves: joint moments and angles over the gait cycle, or over stance.
         doubt: findings about instruments that keep changes of moments from being judged.
         note: what else limits the comparison; empty if nothing does.
+        person: whether both are of one person, where that is in question; else empty.
 
     Examples:
         >>> found = kinertia.compare("before/subject.toml", "after/subject.toml")  # doctest: +SKIP
@@ -96,12 +105,15 @@ class Comparison:
     curves: tuple[CurveChange, ...] = ()
     doubt: str = ""
     note: str = ""
+    person: str = ""
 
     @property
     def sentences(self) -> tuple[str, ...]:
         """Walking speed, each outcome that was named beforehand, how many of the others changed, and limits."""
-        said = (speed_sentence(self.speed), *change_sentences(self.outcomes), changed_sentence(self.outcomes))
-        return (*said, *limit_sentences(self.outcomes, self.doubt), *filter(None, (self.note,)))
+        of_primary = *change_sentences(self.outcomes), lacking_sentence(self.outcomes)
+        said = (speed_sentence(self.speed), *of_primary, changed_sentence(self.outcomes))
+        limits = (*limit_sentences(self.outcomes, self.doubt), self.note)
+        return tuple(filter(None, (self.person, *said, *limits)))
 
     @property
     def steps(self) -> tuple[Change, ...]:
@@ -128,7 +140,7 @@ class Comparison:
     def summary(self) -> dict[str, Any]:
         """What `kinertia compare --json` prints of it."""
         found = changes_summary(self.before, self.after, self.outcomes, self.speed, self.gait)
-        return {**found, "doubt": self.doubt, "note": self.note}
+        return {**found, "doubt": self.doubt, "note": self.note, "person": self.person}
 
 
 @dataclass(frozen=True)
@@ -192,37 +204,95 @@ def compare(
     Raises:
         KinertiaError: they cannot be compared; it says why.
     """
+    sources = opened([before] if after is None else [before, after], conditions)
+    if after is None:
+        (source,) = sources
+        fit = fit_subject(source, progress) if isinstance(source, SubjectFile) else source
+        assert conditions is not None
+        return _of_conditions(fit, conditions, progress, norms)
+    return _of_sessions([fit_of(source, progress) for source in sources], conditions, progress, norms)
 
-    def share_done(share: float) -> None:
-        progress("comparison", share)
 
-    if after is not None:
-        fits = (fit_of(before, progress), fit_of(after, progress))
-        first, other = (session(fit, name) for fit, name in zip(fits, conditions or (None, None), strict=True))
-        reasons = why_incomparable(*fits)
-        if reasons:
-            raise KinertiaError(reasons)
-        names = conditions or ("before", "after")
-        if doubt := why_unjudged(*fits):
-            sign = partial(_sign_in_both, fits)
-            return _comparison(names, first, other, unjudged_changes(first, other, doubt, sign), (), norms)
-        rows, later = session_features(first, other, share_done)
-        outcomes = changes_between(rows.events, later.events, first.fixed_axes or other.fixed_axes)
-        curves = curve_changes(rows.curves, later.curves, apart)
-        note = _NARROW if first.narrow_markers or other.narrow_markers else ""
-        return replace(_comparison(names, first, other, outcomes, curves, norms), note=note)
-    if conditions is None:
+def opened(sources: Sequence[Source], conditions: tuple[str, str] | None) -> list[Fit | SubjectFile]:
+    """Read results and subject files, and make sure before any estimate that they can be compared.
+
+    Args:
+        sources: one session, of which conditions are compared, or several.
+        conditions: that the user chose, if any.
+
+    Raises:
+        KinertiaError: one is neither, cannot be read, or lacks its condition; two are of different sexes, or share a
+            recording.
+    """
+    if len(sources) == 1 and conditions is None:
         raise KinertiaError("give two sessions, or two conditions of one")
-    if isinstance(before, Fit) or Path(before).is_dir():
-        fit = fit_of(before, progress)
-    else:
-        fit = fit_subject(before, progress)
-    features, condition = condition_features(fit, *conditions, share_done)
+    if len(sources) == 1 and conditions is not None:
+        expect_two(*conditions)
+    found = [_opened(source) for source in sources]
+    if len(found) <= 2:
+        for source, wanted in zip(found * 2 if len(found) == 1 else found, conditions or (None, None), strict=False):
+            condition_among(_stated(source), source.subject.name, wanted)
+    if len(found) == 2 and not all(isinstance(source, Fit) for source in found) and (why := other_sex(*found)):
+        raise KinertiaError(why)
+    hashes = [
+        {sha256(trial.markers): trial.markers for trial in source.trials} if isinstance(source, SubjectFile) else {}
+        for source in found
+    ]
+    for first, other in combinations(hashes, 2):
+        for content in first.keys() & other.keys():
+            raise FileError(first[content], "is a recording of both subject files, so nothing can have changed in it")
+    return found
+
+
+def _opened(source: Source) -> Fit | SubjectFile:
+    if isinstance(source, Fit | SubjectFile):
+        return source
+    path = Path(source)
+    if path.name == FIT_FILE:
+        return load_fit(path.parent)
+    if path.is_dir():
+        subject = path / "subject.toml"
+        return read_subject(subject) if subject.is_file() and not (path / FIT_FILE).is_file() else load_fit(path)
+    if path.suffix.lower() in MARKER_FILES:
+        raise FileError(path, "is a recording; give a subject file, which kinertia init drafts, or a folder of results")
+    return read_subject(path)
+
+
+def _stated(source: Fit | SubjectFile) -> list[str]:
+    """Return the conditions of all trials that are compared."""
+    if isinstance(source, Fit):
+        return list(conditions_of(source))
+    return [trial.condition for trial in source.trials if trial.use == "all"]
+
+
+def _of_conditions(fit: Fit, conditions: tuple[str, str], progress: Progress, norms: str | Path | None) -> Comparison:
+    """Compare two conditions of one estimate."""
     first, other = (session(fit, name) for name in conditions)
+    features, condition = condition_features(fit, *conditions, partial(progress, "comparison"))
     found = changes_of_strides(features.events, masks_of(features.events, condition, *conditions))
     masks = masks_of(features.curves, condition, *conditions)
     early, late = (rows_of(features.curves, mask) for mask in masks)
     return _comparison(conditions, first, other, found, curve_changes(early, late, paired), norms)
+
+
+def _of_sessions(
+    fits: Sequence[Fit], conditions: tuple[str, str] | None, progress: Progress, norms: str | Path | None
+) -> Comparison:
+    """Compare two sessions of one person."""
+    before, after = fits
+    first, other = (session(fit, name) for fit, name in zip(fits, conditions or (None, None), strict=True))
+    if reason := why_incomparable(before, after):
+        raise KinertiaError(reason)
+    names, person = conditions or ("before", "after"), identity_note(before, after)
+    if doubt := why_unjudged(before, after):
+        unjudged = unjudged_changes(first, other, doubt, partial(_sign_in_both, (before, after)))
+        return replace(_comparison(names, first, other, unjudged, (), norms), person=person)
+    rows, later = session_features(first, other, partial(progress, "comparison"))
+    outcomes = changes_between(rows.events, later.events, first.fixed_axes or other.fixed_axes)
+    curves = curve_changes(rows.curves, later.curves, apart)
+    found = _comparison(names, first, other, outcomes, curves, norms)
+    narrow = _NARROW if first.narrow_markers or other.narrow_markers else ""
+    return replace(found, note=" ".join(filter(None, (found.note, narrow))), person=person)
 
 
 def _sign_in_both(fits: tuple[Fit, Fit], name: str, side: str) -> int:
@@ -241,7 +311,7 @@ def compared_sessions(
         KinertiaError: their `conditions` cannot be compared, or norms do not fit.
     """
     if len(fits) != 2:
-        return None, "there are more than two results"
+        return None, f"they are compared between two sessions, and these are {len(fits)}"
     before, after = fits
     if reason := why_incomparable(before, after):
         return None, reason
@@ -270,7 +340,15 @@ def _comparison(
     )
     walks = first.trials, other.trials
     gait = gait_changes(*walks) + (() if norms is None else _profiles(first, other, read_norms(norms)))
-    return Comparison(*names, judged, speed_change(*walks), gait, tuple(curves), doubt)
+    return Comparison(*names, judged, speed_change(*walks), gait, tuple(curves), doubt, _tasks_note(walks))
+
+
+def _tasks_note(walks: tuple[Trials, Trials]) -> str:
+    """State the tasks of both where they differ, and which are averaged together."""
+    before, after = (sorted({trial.kinematics.trial.task for trial in trials} - {""}) for trials in walks)
+    if before != after:
+        return f"Tasks differ: {' and '.join(before)} before, {' and '.join(after)} after."
+    return f"Averages are over {' and '.join(before)} together." if len(before) > 1 else ""
 
 
 def _profiles(first: Session, other: Session, norms: Mapping[str, Norm]) -> tuple[Change, ...]:
@@ -280,55 +358,9 @@ def _profiles(first: Session, other: Session, norms: Mapping[str, Norm]) -> tupl
     return profile_changes(first.trials, other.trials, norms)
 
 
-def fit_of(source: Fit | str | Path, progress: Progress) -> Fit:
-    """Return a result: given, loaded from its folder, or estimated from a subject file as one of two sessions."""
-    if isinstance(source, Fit):
-        return source
-    return load_fit(source) if Path(source).is_dir() else fit_session(Path(source), progress)
-
-
-def instrument_doubts(before: tuple[Fit, Trials], after: tuple[Fit, Trials]) -> dict[str, str]:
-    """State the findings that keep changes of moments from being judged, by side of the leg: codes and messages.
-
-    Args:
-        before, after: fit and trials of each condition; of one session, the same fit.
-    """
-    by_side = [_findings(*compared) for compared in (before, after)]
-    if before[0] is after[0]:
-        everywhere = {_kind(finding) for finding in by_side[0]} & {_kind(finding) for finding in by_side[1]}
-        by_side = [
-            [finding for finding in some if finding.severity is Severity.ERROR or _kind(finding) not in everywhere]
-            for some in by_side
-        ]
-    doubts: dict[str, dict[str, str]] = {}
-    for finding in (*by_side[0], *by_side[1]):
-        for side in _sides(finding):
-            doubts.setdefault(side, {})[finding.code] = f"{finding.code}: {finding.message}"
-    return {side: " ".join(said.values()) for side, said in doubts.items()}
-
-
-def _sides(finding: Finding) -> tuple[str, ...]:
-    """Return the sides whose loads a finding is about: that of a foot which it names, or all."""
-    foot = finding.evidence.get("foot")
-    return {"right": ("r",), "left": ("l",)}.get("" if foot is None else str(foot.value), ("r", "l", ""))
-
-
-def _findings(fit: Fit, trials: Trials) -> list[Finding]:
-    names = {trial.name for trial in trials}
-    return [
-        finding
-        for finding in fit.findings
-        if finding.code.startswith(_INSTRUMENTS)
-        and finding.severity >= Severity.WARNING
-        and finding.code not in _LEFT_OUT | _MILD
-        and finding.muted_by is None
-        and finding.status != "ignored"
-        and finding.where.trial in (None, *names)
-    ]
-
-
-def _kind(finding: Finding) -> tuple[str, str | None, str | None]:
-    return finding.code, finding.where.plate, finding.where.axis
+def fit_of(source: Fit | SubjectFile, progress: Progress) -> Fit:
+    """Return a result, or estimate it from a subject file as one of two sessions."""
+    return source if isinstance(source, Fit) else fit_session(source, progress)
 
 
 def fit_session(subject: Path | SubjectFile, progress: Progress = lambda stage, share: None) -> Fit:
