@@ -74,8 +74,8 @@ def compare(
     if conditions is not None and len(results) == 1:
         return _compare_conditions(results[0], conditions, norms, output, overwrite)
     if not 2 <= len(results) <= MOST_FITS:
-        one = "; of one session, --conditions compares two conditions" if len(results) < 2 else ""
-        raise typer.BadParameter(f"give 2 to {MOST_FITS} subject files or results; these are {len(results)}{one}")
+        hint = "; of one session, --conditions compares two conditions" if len(results) < 2 else ""
+        raise typer.BadParameter(f"give 2 to {MOST_FITS} subject files or results; these are {len(results)}{hint}")
     paths = [path.resolve() for path in results]
     if len(set(paths)) < len(paths):
         raise typer.BadParameter("the same file or folder is given twice; for two conditions in it give it once")
