@@ -218,6 +218,23 @@ def test_whether_both_are_one_person_is_asked_where_mass_or_legs_differ(sessions
         assert ("egs of" in identity_note(before, longer)) is asked
 
 
+def test_two_people_are_not_judged_and_a_child_who_grew_is(sessions):
+    before, after = sessions
+    for age in (None, 9.0):
+        fits = [
+            replace(fit, subject=fit.subject.model_copy(update={"mass_kg": kg, "age_years": age}))
+            for fit, kg in ((before, before.mass_kg), (after, 1.2 * before.mass_kg))
+        ]
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(module, "DRAWS", 2)
+            found = compare(*fits)
+        verdicts = {change.verdict for change in (*found.outcomes, *found.steps)}
+        assert (verdicts == {"cannot be judged"}) is (age is None)
+        assert ("not shown" in verdicts) is (age is not None)
+        assert found.sentences[0] == found.person == found.summary["person"]
+        assert ("age_years" in found.person) is (age is None)
+
+
 def test_trials_without_a_step_are_not_compared(sessions):
     """Squats and jumps have no phases between contacts of both feet."""
     standing = []

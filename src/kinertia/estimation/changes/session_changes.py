@@ -56,6 +56,7 @@ NARROW_M = 0.006
 _LIGHTER, _LONGER = 0.1, 0.05
 """Relative differences of mass, and of legs, beyond which it is asked whether results are of one person. Markers put on
 anew change legs by 2 %."""
+_GROWN_YEARS = 20.0
 _OTHER_PERSON = 1.5
 """Ratio of masses beyond which results are hardly of one person: a child takes years to gain as much."""
 
@@ -149,6 +150,12 @@ def other_sex(before: _OfPerson, after: _OfPerson) -> str:
     return f"{sexes[0]} and {sexes[1]} are not the sex of one person: correct it in one of both"
 
 
+def grows(fit: Fit) -> bool:
+    """Return whether a person may have grown, by age or stated population."""
+    age = fit.subject.age_years
+    return fit.subject.population == "child" or (age is not None and age < _GROWN_YEARS)
+
+
 def identity_note(before: Fit, after: Fit) -> str:
     """Ask whether both results are of one person, if mass or legs differ as of two, or of one who grew; else empty."""
     masses, legs = (before.mass_kg, after.mass_kg), (_leg_m(before), _leg_m(after))
@@ -160,7 +167,8 @@ def identity_note(before: Fit, after: Fit) -> str:
     if not found:
         return ""
     text = " and ".join(found)
-    return f"{text[0].upper()}{text[1:]}: is it one person? If not, ignore what follows."
+    remedy = "If not, ignore what follows." if grows(before) else "If a child has grown, state age_years in both files."
+    return f"{text[0].upper()}{text[1:]}: is it one person? {remedy}"
 
 
 def _leg_m(fit: Fit) -> float:

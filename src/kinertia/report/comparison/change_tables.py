@@ -83,7 +83,7 @@ def _judgement(change: Change) -> str:
     if change.doubt and np.isnan(change.sd):
         return f"went {pair}; whether that is a change cannot be judged, since {change.doubt}"
     if change.doubt:
-        return f"went {pair}; a finding about the instruments keeps this from being judged"
+        return f"went {pair}; whether that is a change cannot be judged here, for the reason that is stated"
     if change.verdict == "cannot be judged":
         return f"went {pair}; {change.strides[0]} and {change.strides[1]} repeats cannot show whether that is a change"
     if change.verdict == "changed":

@@ -28,6 +28,7 @@ from kinertia.estimation.changes.session_changes import (
     Session,
     Trials,
     changes_between,
+    grows,
     identity_note,
     instrument_doubts,
     other_sex,
@@ -292,7 +293,17 @@ def _of_sessions(
     curves = curve_changes(rows.curves, later.curves, apart)
     found = _comparison(names, first, other, outcomes, curves, norms)
     narrow = _NARROW if first.narrow_markers or other.narrow_markers else ""
-    return replace(found, note=" ".join(filter(None, (found.note, narrow))), person=person)
+    noted = replace(found, note=" ".join(filter(None, (found.note, narrow))), person=person)
+    return noted if not person or grows(before) else _doubted(noted, person)
+
+
+def _doubted(found: Comparison, why: str) -> Comparison:
+    """Let nothing be judged."""
+    outcomes, gait = (
+        tuple(replace(change, doubt=why) for change in changes) for changes in (found.outcomes, found.gait)
+    )
+    speed = None if found.speed is None else replace(found.speed, doubt=why)
+    return replace(found, outcomes=outcomes, gait=gait, speed=speed)
 
 
 def _sign_in_both(fits: tuple[Fit, Fit], name: str, side: str) -> int:
