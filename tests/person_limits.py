@@ -116,7 +116,7 @@ def late(seconds, patched, uneven_s=0.0):
     patched.setattr(contact_delays.ContactDelays, "of", lambda contacts, feet: delays)
     patched.setattr(contact_delays, "contacts_of", lambda plates, feet: [SimpleNamespace(distance_m=0.0)])
     context = plates_alone(plates(STEADY, np.full(200, 0.5)))
-    made = SimpleNamespace(plates=context.plates, foot_trajectories=(), whole_contacts=(), at=at)
+    made = SimpleNamespace(plates=context.plates, foot_trajectories=(), whole_contacts=(), velocities=(), at=at)
     return [contact_delay.finding for contact_delay in contact_delays.contact_delays(made)]
 
 
@@ -189,6 +189,7 @@ PERSON_LIMITS = {
     "T202 least": (moved_by_forces, 0.41, 0.39, [], ["ERROR"]),
     "T202 most": (moved_by_forces, 1.79, 1.81, [], ["ERROR"]),
     "T211 delay": (late, 0.044, 0.046, [], ["ERROR"]),
+    "T211 ends": (lambda s, patched: late(0.06, patched, 0.06 - s), 0.029, 0.031, [], ["ERROR"]),
     "T212 longest": (late, 0.249, 0.251, [], ["ERROR"]),
     "T213 delay": (uneven, 0.0119, 0.0121, [], ["WARNING"]),
     "T213 short": (lambda s: uneven(s, True), 0.0179, 0.0181, [], ["WARNING"]),

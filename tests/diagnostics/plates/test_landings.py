@@ -7,7 +7,7 @@ import pytest
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.body_motion import force_velocities
-from kinertia.diagnostics.plates.cop_positions import forces_keep_time
+from kinertia.diagnostics.plates.contact_delays import forces_keep_time
 from kinertia.diagnostics.registry import LOADED_CHECKS, PLACE_CHECKS
 from kinertia.diagnostics.runner import asked
 from kinertia.findings.finding import Severity

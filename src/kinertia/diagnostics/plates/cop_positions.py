@@ -21,7 +21,6 @@ import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.ambiguous_loads import FOOT_ENDS, beyond_edges
-from kinertia.diagnostics.evidence.body_motion import LARGEST_RESIDUAL, vertical_match_of
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory
 from kinertia.diagnostics.evidence.plate_contacts import (
     COP_MIN_FORCE_N,
@@ -33,12 +32,14 @@ from kinertia.diagnostics.evidence.plate_contacts import (
     displaced,
 )
 from kinertia.diagnostics.plates.contact_delays import (
+    BOTH_ENDS_S,
     DELAY_S,
     LEAST_RATE_ERROR,
     LONGEST_DELAY_S,
     RATES,
     contact_delays,
     fitted_rate_or_delay,
+    forces_keep_time,
     stance_durations,
 )
 from kinertia.diagnostics.plates.plate_positions import WRONG_M, interchanged_plates, rotated_plates
@@ -96,6 +97,7 @@ _MOST_SHARE = Limit(0.5)
     most_ratio=RATES[1],
     growth=LEAST_RATE_ERROR,
     delay=DELAY_S,
+    ends=BOTH_ENDS_S,
     longest=LONGEST_DELAY_S,
 )
 def loads_and_feet(context: RecordingContext) -> Iterator[Finding]:
@@ -110,7 +112,7 @@ def loads_and_feet(context: RecordingContext) -> Iterator[Finding]:
     if not context.shows_whole_feet:
         return
     feet = context.foot_trajectories
-    timely = forces_keep_time(context)
+    timely = not context.has_strides and forces_keep_time(context)
     hypotheses = list(
         chain(
             () if timely else fitted_rate_or_delay(context),
@@ -284,20 +286,6 @@ def _excess_of_both(begin_m: float, end_m: float) -> float:
 def _origin(context: RecordingContext, offset: Quantity, contacts: int, method: str, **measured: Quantity) -> Finding:
     how = {"contacts": Quantity(contacts, "1"), "method": Quantity(method)}
     return with_evidence("P243", context.at(), {"offset_m": offset, **measured, **how})
-
-
-_DELAY_S = 0.03
-"""Pelvis and marker-based centre follow the forces of fault-free trials within this."""
-
-
-def forces_keep_time(context: RecordingContext) -> bool:
-    """Return whether vertical velocities show, without strides, that the forces are not delayed."""
-    if context.has_strides:
-        return False
-    found = [
-        match for part in context.velocities for match in vertical_match_of(part) if match.residual <= LARGEST_RESIDUAL
-    ]
-    return bool(found) and max(abs(match.delay_s) for match in found) < _DELAY_S
 
 
 @check("P251", "P252", unless=NEEDS_LOADS_UNDER_FEET, fixed=_FIXED_M, backwards=_BACKWARDS, forwards=_FORWARDS)
