@@ -23,6 +23,8 @@ from kinertia.estimation.changes.stride_features import _CONTACTS, CONTACT_SD_S,
 from kinertia.findings.finding import Severity, finding
 from kinertia.findings.quantity import Quantity, Where
 from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.gait27 import VIRTUAL_TRUNK
+from kinertia.model.skeleton import Marker
 from kinertia.report.comparison.what_changed import compare
 from kinertia.report.exports.saved_fit import write_fit
 from kinertia.trial.stances import load_edges
@@ -151,6 +153,19 @@ def test_results_of_one_session_alone_are_pointed_out(sessions):
         assert bool(found.note) is narrow
         assert (found.sentences[-1] == found.note) is narrow
         assert found.summary["note"] == found.note
+
+
+def test_markers_of_a_trunk_that_has_none_do_not_hide_that_a_result_is_of_one_session_alone(sessions):
+    before, _ = sessions
+    draws = before.posterior.draws
+    labels = [marker.label for marker in VIRTUAL_TRUNK]
+    virtual = [Marker(label, "torso", np.zeros(3)) for label in labels]
+    skeleton = before.skeleton.with_markers([*before.skeleton.markers, *virtual])
+    wide = np.random.default_rng(0).normal(0.0, 0.04, (draws.count, len(virtual), 3))
+    for scale, narrow in ((0.0, True), (10.0, False)):
+        own = np.random.default_rng(1).normal(0.0, 0.001 * scale, draws.places.shape)
+        posterior = replace(before.posterior, draws=replace(draws, places=np.concatenate([own, wide], axis=1)))
+        assert session(replace(before, skeleton=skeleton, posterior=posterior)).narrow_markers is narrow
 
 
 def test_both_are_evaluated_with_one_body(sessions):

@@ -43,7 +43,7 @@ from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import PosteriorDraws
 from kinertia.findings.finding import Finding, Severity
 from kinertia.model.anatomy import segment_of
-from kinertia.model.gait27 import AXIS_TILTS
+from kinertia.model.gait27 import AXIS_TILTS, VIRTUAL_TRUNK
 from kinertia.settings import Subject
 from kinertia.trial.data import FEET
 
@@ -53,6 +53,7 @@ were their axes' error."""
 _BY_AXES = ("moment ankle", "moment subtalar", "angle hip_rotation", "angle knee", "angle ankle", "angle subtalar")
 NARROW_M = 0.006
 """Largest SD of a marker's position in a fit of one session alone, with a prior of 5 mm; as one of two it has 10 mm."""
+_VIRTUAL = frozenset(marker.label for marker in VIRTUAL_TRUNK)
 _LIGHTER, _LONGER = 0.1, 0.05
 """Relative differences of mass, and of legs, beyond which it is asked whether results are of one person. Markers put on
 anew change legs by 2 %."""
@@ -90,7 +91,8 @@ class Session:
     @property
     def narrow_markers(self) -> bool:
         """Whether markers were taken to be where the session's static trial has them, within NARROW_M."""
-        return bool(kept_draws(self.fit).places.std(axis=0).max(initial=0.0) < NARROW_M)
+        seen = [label not in _VIRTUAL for label in self.fit.skeleton.labels]
+        return bool(kept_draws(self.fit).places[:, seen].std(axis=0).max(initial=0.0) < NARROW_M)
 
 
 def session(fit: Fit, condition: str | None = None) -> Session:
