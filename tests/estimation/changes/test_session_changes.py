@@ -163,8 +163,8 @@ def test_markers_of_a_trunk_that_has_none_do_not_hide_that_a_result_is_of_one_se
     skeleton = before.skeleton.with_markers([*before.skeleton.markers, *virtual])
     wide = np.random.default_rng(0).normal(0.0, 0.04, (draws.count, len(virtual), 3))
     for scale, narrow in ((0.0, True), (10.0, False)):
-        own = np.random.default_rng(1).normal(0.0, 0.001 * scale, draws.places.shape)
-        posterior = replace(before.posterior, draws=replace(draws, places=np.concatenate([own, wide], axis=1)))
+        placed = np.random.default_rng(1).normal(0.0, 0.001 * scale, draws.places.shape)
+        posterior = replace(before.posterior, draws=replace(draws, places=np.concatenate([placed, wide], axis=1)))
         assert session(replace(before, skeleton=skeleton, posterior=posterior)).narrow_markers is narrow
 
 
