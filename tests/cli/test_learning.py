@@ -21,6 +21,7 @@ from kinertia.io.norms_file import read_norms
 from kinertia.io.subject.learnt_files import PersonInstruments, read_session
 from kinertia.io.subject.provenance import Provenance, recordings
 from kinertia.io.subject.reader import read_subject
+from kinertia.motion.spatiotemporal import MEASURES
 from kinertia.report.exports.saved_fit import FIT_FILE, write_fit
 from kinertia.settings import Instruments
 from kinertia.workflow.from_files import check_plates, prepare_subject
@@ -158,6 +159,8 @@ def test_norms_and_scores(fit, demo_run, controls, tmp_path):
     norm = read_norms(file)["knee_angle_angle"]
     assert (norm.people, norm.convention, norm.age_years) == (3, "Kinertia gait27", (20.0, 40.0))
     assert "norms mix" not in outcome.out
+    sides = fit.spatiotemporal.groupby("side").speed_m_s.mean()
+    assert read_norms(file)["speed_m_s"].mean == pytest.approx([sides.mean()], rel=0.02), "draws of one person"
     results = tmp_path / "out"
     results.mkdir()
     shutil.copy(demo_run[1] / FIT_FILE, results)
@@ -169,6 +172,8 @@ def test_norms_and_scores(fit, demo_run, controls, tmp_path):
     page = (results / "report.html").read_text(encoding="utf-8")
     assert "Gait Profile Score" in page
     assert "norm, right" in json.dumps(figures_of(page), default=str)
+    assert ">controls<" in page
+    assert "norm, mean" in json.dumps(figures_of(page)["cycle-joint-moments"], default=str)
     scores = list(csv.DictReader((results / "gps.csv").open(encoding="utf-8")))
     assert len(scores) == 21
     cycles = pd.read_csv(results / "cycles.csv")
@@ -177,6 +182,20 @@ def test_norms_and_scores(fit, demo_run, controls, tmp_path):
     assert run("report", results).status == 0
     assert not (results / "gps.csv").exists(), "scores of norms that the report no longer has"
     pd.testing.assert_frame_equal(fit.cycles(), pd.read_csv(results / "cycles.csv"), rtol=1e-4, check_dtype=False)
+
+
+def test_norms_of_versions_without_measures_are_read(demo_run, controls, tmp_path):
+    file, results = tmp_path / "norms.csv", tmp_path / "out"
+    assert run("norms", controls, "-o", file).status == 0
+    table = pd.read_csv(file)
+    table[~table.quantity.isin(MEASURES)].to_csv(file, index=False)
+    results.mkdir()
+    shutil.copy(demo_run[1] / FIT_FILE, results)
+    outcome = run("report", results, "--norms", file)
+    assert outcome.status == 0, outcome.err
+    page = (results / "report.html").read_text(encoding="utf-8")
+    assert "Gait Profile Score" in page
+    assert ">controls<" not in page
 
 
 def test_one_folder_per_person(controls, tmp_path):

@@ -14,6 +14,7 @@ from kinertia.estimation.result.mean_cycles import profiles_by_task
 from kinertia.io.norms_file import Norm
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.model_outputs import CLINICAL_ANGLES
+from kinertia.motion.spatiotemporal import MEASURES
 from kinertia.report.comparison.side_by_side import render_comparison
 from kinertia.report.pages.page import render
 from report_page import without_plotly
@@ -282,11 +283,11 @@ def test_codes_lead_to_what_they_mean(browser, fit, tmp_path, viewport):
 
 
 @pytest.mark.parametrize("viewport", [DESKTOP, PHONE])
-@pytest.mark.parametrize("findings", [FAULT_FREE, UNUSABLE])
-def test_the_first_screen_has_what_may_be_used_and_why(browser, fit, tmp_path, findings, viewport):
+@pytest.mark.parametrize(("findings", "norms"), [(FAULT_FREE, False), (FAULT_FREE, True), (UNUSABLE, False)])
+def test_the_first_screen_has_what_may_be_used_and_why(browser, fit, tmp_path, findings, norms, viewport):
     """On a desktop what to do next, too, and within two screens all curves; everything is at most 8,000 px long."""
     path = tmp_path / "report.html"
-    path.write_text(render(replace(fit, findings=findings, rules=61)), encoding="utf-8")
+    path.write_text(page_of(replace(fit, findings=findings, rules=61), norms), encoding="utf-8")
     page = browser.new_page(viewport=viewport)
     page.goto(path.as_uri())
     last = page.locator("#verdict .uses").bounding_box()
@@ -307,6 +308,15 @@ def test_the_first_screen_has_what_may_be_used_and_why(browser, fit, tmp_path, f
     page.get_by_text("output by output, and why").click()
     assert page.locator("#outputs .level:visible").count() == 5
     page.close()
+
+
+def page_of(fit, normed, **options):
+    """A report, with norms of angles and strides or without any."""
+    if not normed:
+        return render(fit, **options)
+    norms = {name: Norm(np.array([0.0, 100.0]), np.zeros(2), np.ones(2)) for name in CLINICAL_ANGLES}
+    norms |= {name: Norm(np.zeros(1), np.zeros(1), np.full(1, 0.1)) for name in MEASURES}
+    return render(fit, norms=norms, profiles=profiles_by_task(fit, norms), **options)
 
 
 def bottom(page, part):
@@ -402,11 +412,8 @@ def test_comparison_is_drawn_fits_the_window_and_sorts(browser, comparison, widt
 
 def test_a_letter_with_norms_is_as_wide_as_the_paper(browser, fit, tmp_path):
     """The chart of gait scores was wider, so that the browser printed everything smaller."""
-    norms = {name: Norm(np.array([0.0, 100.0]), np.zeros(2), np.ones(2)) for name in CLINICAL_ANGLES}
     path = tmp_path / "letter.html"
-    path.write_text(
-        render(fit, norms=norms, profiles=profiles_by_task(fit, norms), template="letter"), encoding="utf-8"
-    )
+    path.write_text(page_of(fit, True, template="letter"), encoding="utf-8")
     page = Opened(browser, path).page
     page.set_viewport_size({"width": PAPER_PX, "height": 900})
     page.emulate_media(media="print")

@@ -239,6 +239,31 @@ def test_table_of_strides(fit):
     assert 90 < right.cadence_steps_min.mean() < 150
 
 
+def measure(mean, sd, people=None):
+    return Norm(np.zeros(1), np.array([mean]), np.array([sd]), people)
+
+
+def test_strides_stand_beside_the_controls(fit):
+    """A few controls know their own spread badly, so that more is needed to be low or high."""
+    steps = fit.spatiotemporal.groupby("side").cadence_steps_min.mean()
+    norms = {
+        "cadence_steps_min": measure(steps.r + 3.0, 1.0, 20),
+        "speed_m_s": measure(0.1, 0.05),
+        "stride_time_s": measure(fit.spatiotemporal.stride_time_s.mean() + 0.3, 0.1, 3),
+        "step_width_m": measure(0.1, 0.0, 9),
+    }
+    rows = {row.measure: row for row in stride_rows(fit, norms)}
+    assert rows["cadence (steps/min)"].controls == f"{steps.r + 3.0:.1f} ± 1.0"
+    assert rows["cadence (steps/min)"].verdicts[0] == "low"
+    assert rows["speed (m/s)"].verdicts[0] == "high"
+    assert rows["stride time (s)"].verdicts[0] == rows["step width (m)"].verdicts[0] == ""
+    assert (rows["stance (% of cycle)"].controls, rows["strides"].controls) == ("", "")
+    page = Elements(render(fit, norms=norms)).text
+    assert "outside the range of 95 % of people like the controls" in page
+    assert "norms, mean ± 1 SD" not in page, "no curve has a band"
+    assert "like the controls" not in render(fit)
+
+
 def test_a_motion_without_strides_stays_over_time(fit):
     (trial,) = fit.trials
     standing = replace(trial)

@@ -18,6 +18,7 @@ from kinertia.io.output_folder import complete_folder, updated_files
 from kinertia.io.subject.provenance import names_from_common_folder
 from kinertia.io.versions import VERSION
 from kinertia.motion.model_outputs import CLINICAL_ANGLES, CONVENTIONS
+from kinertia.motion.spatiotemporal import MEASURES
 from kinertia.report.comparison.change_tables import change_columns, curve_columns
 from kinertia.report.comparison.side_by_side import (
     MOST_FITS,
@@ -202,8 +203,9 @@ def score_text(degrees: float) -> str:
 
 
 def _norms_for(fit: Fit, path: Path) -> tuple[dict[str, Norm], list[str]]:
-    """Read the norms in a file, and list those for which this fit has no curve."""
+    """Read the norms in a file, and list those for which this fit has no curve, nor measure of strides."""
     norms, known = read_norms(path), {curve.quantity for curve in fit.curves["estimate"]}
+    known |= set(MEASURES) if any(trial.strides for trial in fit.trials) else set()
     check_convention(fit, norms)
     unknown = sorted(set(norms) - known)
     if len(unknown) == len(norms):

@@ -4,7 +4,8 @@
     knee_angle_angle,0,5.1,3.9
     knee_angle_angle,1,6.0,4.1
 
-Names and units of the quantities are those of `cycles.csv`. Percents may be coarser. `kinertia norms` adds the number
+Names and units of the quantities are those of `cycles.csv`. Percents may be coarser; measures of strides, such as
+speed_m_s, have a row at 0 %. `kinertia norms` adds the number
 of people (n), spans of age and speed, and the convention of each quantity.
 """
 

@@ -1,7 +1,7 @@
 """Computes speed, cadence, lengths and times of strides."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Self
 
 import numpy as np
@@ -49,6 +49,9 @@ class Spatiotemporal:
     step_width_m: float
     stance_percent: float
     double_support_percent: float
+
+
+MEASURES = tuple(field.name for field in fields(Spatiotemporal))
 
 
 def spatiotemporal(

@@ -222,7 +222,7 @@ def test_legends_have_at_most_four_entries(page):
 def test_a_reason_is_given_once():
     moments, parameters, opensim = (Purpose(name, "use", "whole stride; 2 N") for name in ("Moments", "B", "OpenSim"))
     shown = without_repetition([moments, parameters._replace(reason="other"), opensim], "whole stride")
-    assert [purpose.reason for purpose in shown] == ["2 N", "other", "as moments"]
+    assert [purpose.reason for purpose in shown] == ["2 N", "other", "same as for moments"]
     assert [purpose.use for purpose in shown] == ["use"] * 3
 
 

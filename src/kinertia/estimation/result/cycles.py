@@ -9,7 +9,7 @@ peaks whether a heel strike follows or not; a landing has peaks of its own.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any, Literal, NamedTuple
 
@@ -20,7 +20,7 @@ from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.motion.gait_cycle import PERCENT, FeetUnderPelvis, Stride, feet_under_pelvis
 from kinertia.motion.joint_moments import component_names, joint_and_side
 from kinertia.motion.model_outputs import clinical_angles
-from kinertia.motion.spatiotemporal import Spatiotemporal, spatiotemporal, travelled
+from kinertia.motion.spatiotemporal import MEASURES, spatiotemporal, travelled
 from kinertia.trial.data import FEET
 from kinertia.trial.file_contents import Belt
 from kinertia.trial.sampled_data import within
@@ -220,8 +220,7 @@ def spatiotemporal_columns(trials: Sequence[Estimated]) -> dict[str, list[Any]]:
             place = {"trial": trial.name, "side": stride.side, "stride": stride.number}
             times = {"start_s": stride.start_s, "end_s": stride.end_s, "toe_off_s": stride.toe_off_s}
             rows.append({**place, **times, **asdict(of_stride), "on_plates": stride.on_plates})
-    measured = [field.name for field in fields(Spatiotemporal)]
-    names = ["trial", "side", "stride", "start_s", "end_s", "toe_off_s", *measured, "on_plates"]
+    names = ["trial", "side", "stride", "start_s", "end_s", "toe_off_s", *MEASURES, "on_plates"]
     return {name: [row[name] for row in rows] for name in names}
 
 

@@ -27,14 +27,18 @@ from kinertia.estimation.result.gait_scores import GaitProfile, rms_deg, variabl
 from kinertia.io.norms_file import Norm
 from kinertia.model.skeleton import opposite_on_left
 from kinertia.motion.gait_cycle import PERCENT
+from kinertia.motion.joint_moments import component_names
 from kinertia.motion.model_outputs import CLINICAL_ANGLES
+from kinertia.motion.spatiotemporal import MEASURES
 from kinertia.trial.data import FEET
 
 _BUILT_IN = "gait27"
 _KINDS: Mapping[Stage, tuple[str, ...]] = {
     "literature": ("angle",),
-    "estimate": ("clinical", "moment", "power", "force"),
+    "estimate": ("clinical", "moment", "joint_moment", "power", "force"),
 }
+_LUMBAR = tuple(f"{name}_joint_moment" for name in component_names("lumbar"))
+"""Left out: the sides share them, some with opposite signs."""
 MeanCurves = Mapping[tuple[str, str], np.ndarray]
 """Mean curves (101,) by quantity and side, in the units of `cycles.csv`; NaN where nothing was measured."""
 _AS_LONG = 0.9
@@ -60,7 +64,7 @@ def mean_curves(fit: Fit) -> MeanCurves:
     flipped = {f"{name}_{kind}" for name in opposite_on_left(fit.skeleton) for kind in ("angle", "moment")}
     for stage, kinds in _KINDS.items():
         for cycle in (curve for trial in main_task(fit).trials for curve in cycle_curves(trial, fit.mass_kg, stage)):
-            if cycle.kind in kinds:
+            if cycle.kind in kinds and cycle.quantity not in _LUMBAR:
                 sign = -1.0 if cycle.quantity in flipped and cycle.stride.side == "l" else 1.0
                 found.setdefault((cycle.quantity, cycle.stride.side), []).append(sign * cycle.value)
     return {name: mean_of_common(np.array(curves)) for name, curves in found.items()}
@@ -214,7 +218,7 @@ class Control:
 
     Attributes:
         name: of the person.
-        curves: by quantity (101,), mean of both sides.
+        curves: by quantity, mean of both sides: (101,), or (1,) of a measure of strides such as speed_m_s.
         age_years: as stated, or None.
         speed_m_s: mean over all strides; NaN where unknown.
         convention: of all quantities, as in `convention_of`.
@@ -240,7 +244,20 @@ class Control:
         for quantity in dict.fromkeys(name for name, _ in by_side):
             sides = np.array([by_side[quantity, side] for side in FEET if (quantity, side) in by_side])
             curves[quantity] = mean_of_common(sides)
+        curves |= _mean_measures(main_task(fit))
         return cls(fit.subject.name, curves, fit.subject.age_years, mean_speed_m_s(fit), convention_of(fit))
+
+
+def _mean_measures(fit: Fit) -> dict[str, np.ndarray]:
+    """Return the mean (1,) over the sides of each measure's mean over their strides, where it is known."""
+    columns = spatiotemporal_columns(fit.trials)
+    sides, result = np.array(columns["side"]), {}
+    for name in MEASURES:
+        values = np.array(columns[name], dtype=float)
+        known = [of_side for side in FEET if len(of_side := values[(sides == side) & np.isfinite(values)])]
+        if known:
+            result[name] = np.array([np.mean([of_side.mean() for of_side in known])])
+    return result
 
 
 def mean_speed_m_s(fit: Fit) -> float:
@@ -264,6 +281,8 @@ def mixture(people: Sequence[Control]) -> str:
 def band_columns(people: Sequence[Control]) -> dict[str, list[Any]]:
     """Compute the columns of a norms file, by name: a row per quantity and percent that at least two people have.
 
+    A measure of strides, such as speed_m_s, has one row, at 0 %.
+
     Every person counts once, however many strides were measured.
 
     Raises:
@@ -285,7 +304,7 @@ def band_columns(people: Sequence[Control]) -> dict[str, list[Any]]:
     rows: list[tuple[Any, ...]] = []
     for quantity in sorted({name for person in people for name in person.curves}):
         curves = np.array([person.curves[quantity] for person in people if quantity in person.curves])
-        for percent, values in zip(PERCENT.tolist(), curves.T, strict=True):
+        for percent, values in zip(PERCENT[: curves.shape[1]].tolist(), curves.T, strict=True):
             known = values[np.isfinite(values)]
             if len(known) >= FEWEST_PEOPLE:
                 rows.append((quantity, int(percent), float(known.mean()), float(known.std(ddof=1)), len(known)))

@@ -50,7 +50,7 @@ _OF_FILES: Mapping[Kind, SignConvention] = {"joint_moment": "isb", "clinical": "
 _SD_OPACITY, _BAND_OPACITY, _STRIDE_OPACITY, _GAP_OPACITY = 0.13, 0.25, 0.45, 0.08
 _OF_LANDINGS: tuple[Kind, ...] = ("joint_moment", "moment", "angle", "power", "force")
 _FLEXION_POWERS = frozenset({"hip_flexion_power", "knee_angle_power", "ankle_angle_power"})
-_PANEL_PX = 108
+_PANEL_PX = 100
 _PERCENT_OF: Mapping[Phase, str] = {"stride": "the gait cycle", "stance": "stance", "landing": "the landing"}
 _FORCE_TITLES = dict(zip(FORCES, ("Forward +", "Upward +", "Towards the other foot +"), strict=True))
 

@@ -2,15 +2,19 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.special import stdtrit
 
 from kinertia.estimation.result.cycles import CycleCurve, peak_columns, spatiotemporal_columns
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.gait_scores import GaitProfile
-from kinertia.estimation.result.mean_cycles import fits_by_task
+from kinertia.estimation.result.mean_cycles import FEWEST_PEOPLE, fits_by_task
+from kinertia.io.norms_file import Norm
 from kinertia.motion.model_outputs import CLINICAL_ANGLES
+from kinertia.motion.spatiotemporal import MEASURES
 from kinertia.report.figures.coordinate_titles import convention_of
 from kinertia.report.figures.cycle_figures import (
     Norms,
@@ -24,6 +28,8 @@ from kinertia.report.figures.figure import SIDES, Figure, base_layout, written
 from kinertia.report.wording import INTERVAL_SD
 from kinertia.trial.data import FEET
 
+_COVERED = 0.95
+"""Share of people like the controls that is neither low nor high."""
 _ROWS = (
     ("speed_m_s", "speed (m/s)", 2),
     ("cadence_steps_min", "cadence (steps/min)", 1),
@@ -32,8 +38,8 @@ _ROWS = (
     ("stride_time_s", "stride time (s)", 3),
     ("step_time_s", "step time (s)", 3),
     ("step_width_m", "step width (m)", 3),
-    ("stance_percent", "stance (% of the cycle)", 1),
-    ("double_support_percent", "double support (% of the cycle)", 1),
+    ("stance_percent", "stance (% of cycle)", 1),
+    ("double_support_percent", "double support (% of cycle)", 1),
 )
 
 
@@ -62,10 +68,10 @@ def _cycle(fit: Fit, norms: Norms, scored: GaitProfile | None) -> dict[str, Any]
     names = {trial.name for trial in fit.trials if trial.joint_curves is not None}
     strides = [stride for trial in fit.trials for stride in trial.strides]
     return {
-        "rows": stride_rows(fit),
+        "rows": stride_rows(fit, norms),
         "peaks": peak_rows([curve for curve in fit.curves["estimate"] if curve.trial in names]),
         "trials": [trial.name for trial in fit.trials],
-        "norms": bool(norms),
+        "norms": not set(MEASURES).issuperset(norms),
         "profile": profile,
         "map": None if profile is None else written(map_figure(profile)),
         "clinical": None if clinical is None or convention_of(fit) == "opensim" else written(clinical),
@@ -94,24 +100,54 @@ def _phase(figures: PhaseFigures) -> dict[str, Any]:
 
 
 class MeasureRow(NamedTuple):
-    """One measure in words, with mean and standard deviation per side."""
+    """One measure in words, with mean and standard deviation per side and of the controls.
+
+    Attributes:
+        measure: its name with the unit.
+        right, left: as text.
+        controls: mean and SD of the norms; empty without.
+        verdicts: of right and left: "low" or "high" against the controls, else empty.
+    """
 
     measure: str
     right: str
     left: str
+    controls: str = ""
+    verdicts: tuple[str, ...] = ("", "")
 
 
-def stride_rows(fit: Fit) -> list[MeasureRow]:
+def stride_rows(fit: Fit, norms: Norms = MappingProxyType({})) -> list[MeasureRow]:
     """Return the table's rows; none where no trial has a stride."""
     columns = spatiotemporal_columns(fit.trials)
     if not columns["side"]:
         return []
     sides = np.array(columns["side"])
-    rows = [
-        MeasureRow(title, *(_mean_and_sd(np.array(columns[name])[sides == side], digits) for side in FEET))
-        for name, title, digits in _ROWS
-    ]
-    return [MeasureRow("strides", *(str(int((sides == side).sum())) for side in FEET)), *rows]
+    right, left = (str(int((sides == side).sum())) for side in FEET)
+    rows = [MeasureRow("strides", right, left)]
+    for name, title, digits in _ROWS:
+        by_side = [np.array(columns[name])[sides == side] for side in FEET]
+        right, left = (_mean_and_sd(values, digits) for values in by_side)
+        if norm := norms.get(name):
+            controls = f"{norm.mean[0]:.{digits}f} ± {norm.sd[0]:.{digits}f}"
+            rows.append(MeasureRow(title, right, left, controls, tuple(_against(norm, values) for values in by_side)))
+        else:
+            rows.append(MeasureRow(title, right, left))
+    return rows
+
+
+def _against(norm: Norm, values: np.ndarray) -> str:
+    """Return whether the mean is "low" or "high": outside the range of 95 % of people like the controls.
+
+    >>> _against(Norm(np.zeros(1), np.array([1.3]), np.array([0.1]), people=20), np.array([1.08, np.nan]))
+    'low'
+    """
+    known = values[np.isfinite(values)]
+    if not len(known) or not norm.sd[0] > 0.0 or (norm.people or FEWEST_PEOPLE) < FEWEST_PEOPLE:
+        return ""
+    people = np.inf if norm.people is None else norm.people
+    sds = stdtrit(people - 1.0, 0.5 + 0.5 * _COVERED) * np.sqrt(1.0 + 1.0 / people)
+    away = (known.mean() - norm.mean[0]) / norm.sd[0]
+    return "" if abs(away) <= sds else "low" if away < 0.0 else "high"
 
 
 def peak_rows(curves: Sequence[CycleCurve]) -> list[MeasureRow]:
@@ -125,7 +161,8 @@ def peak_rows(curves: Sequence[CycleCurve]) -> list[MeasureRow]:
     for peak, unit in dict.fromkeys(zip(columns["peak"], columns["unit"], strict=True)):
         of_peak = np.array(columns["peak"]) == peak
         sides = [of_peak & (np.array(columns["side"]) == side) for side in FEET]
-        rows.append(MeasureRow(f"{peak} ({unit})", *(_with_interval(values[some], sds[some]) for some in sides)))
+        right, left = (_with_interval(values[some], sds[some]) for some in sides)
+        rows.append(MeasureRow(f"{peak} ({unit})", right, left))
     return rows
 
 
@@ -198,7 +235,7 @@ def map_figure(view: ProfileView) -> Figure:
     ]
     layout = base_layout("Movement Analysis Profile: Gait Variable Score of each angle, and Gait Profile Score.")
     layout |= {
-        "height": 60 + 22 * len(view.rows),
+        "height": 60 + 19 * len(view.rows),
         "margin": {"t": 30, "b": 40, "l": 130, "r": 14},
         "barmode": "group",
         "xaxis": {"title": {"text": "Gait Variable Score (degrees)", "font": {"size": 11}}, "rangemode": "tozero"},

@@ -102,7 +102,7 @@ def without_repetition(rated: Sequence[Purpose], said: str) -> list[Purpose]:
     result: list[Purpose] = []
     for purpose in rated:
         like = next((other for other in rated[: len(result)] if other.reason == purpose.reason), None)
-        reason = purpose.reason.removeprefix(f"{said}; ") if like is None else f"as {like.name.lower()}"
+        reason = purpose.reason.removeprefix(f"{said}; ") if like is None else f"same as for {like.name.lower()}"
         result.append(purpose._replace(reason=reason))
     return result
 

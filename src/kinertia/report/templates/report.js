@@ -47,7 +47,7 @@
   let next = 0;
   function drawNext() {
     if (next >= plots.length) return;
-    if (!closed(plots[next])) draw(plots[next], room(plots[next])); // the others when they are opened
+    if (!printing && !closed(plots[next])) draw(plots[next], room(plots[next])); // the others when they are opened
     next += 1;
     soon(drawNext, { timeout: 200 });
   }
