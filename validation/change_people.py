@@ -7,7 +7,8 @@ third day the person walks otherwise, by a change of known size.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -19,12 +20,9 @@ from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.trial_fit import JointCurves, TrialFit
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
-from kinertia.model.skeleton import Skeleton
-from kinertia.motion.dynamics import Motion, inverse_dynamics
+from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.motion.gait_cycle import Stride
-from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.joint_moments import joint_moments
-from kinertia.motion.kinematics import Kinematics
 from kinertia.report.comparison.what_changed import with_markers_anew
 from kinertia.settings import Settings, Subject
 from kinertia.synthetic.laboratory import PERFECT, ClusterMotion, SkinMotion, camera_noise, record
@@ -241,20 +239,20 @@ def _truth(fit: Fit, exact: SyntheticTrial) -> dict[str, float]:
     return names
 
 
-@dataclass(frozen=True, eq=False)
-class _Exact:
-    """A trial whose curves are true (`curve_source.Estimated`)."""
+@dataclass(frozen=True, eq=False, repr=False)
+class _Exact(TrialFit):
+    """A trial whose curves and contacts are true."""
 
-    name: str
-    kinematics: Kinematics
-    skeleton: Skeleton
-    motion: Motion
-    reactions: GroundReactions
-    joint_loads: Mapping[str, np.ndarray]
-    joint_curves: JointCurves
-    strides: tuple[Stride, ...]
-    phases: tuple[Stride, ...]
-    deviations: None = None
+    true_strides: tuple[Stride, ...] = ()
+    true_phases: tuple[Stride, ...] = ()
+
+    @cached_property
+    def strides(self) -> tuple[Stride, ...]:
+        return self.true_strides
+
+    @cached_property
+    def phases(self) -> tuple[Stride, ...]:
+        return self.true_phases
 
 
 def _exactly(trial: TrialFit, exact: SyntheticTrial) -> _Exact:
@@ -268,8 +266,9 @@ def _exactly(trial: TrialFit, exact: SyntheticTrial) -> _Exact:
     known = np.ones_like(curves.known)
     exact_curves = JointCurves(curves.time, known, motion, {"estimate": forces}, {"estimate": joints}, None)
     strides, phases = (tuple(_at_contacts(stride, exact) for stride in some) for some in (trial.strides, trial.phases))
-    kept = trial.kinematics, exact.skeleton, trial.motion, trial.reactions, trial.joint_loads
-    return _Exact(trial.name, *kept, exact_curves, strides, phases)
+    estimated = {field.name: getattr(trial, field.name) for field in fields(trial)}
+    true = {"skeleton": exact.skeleton, "joint_curves": exact_curves, "deviations": None}
+    return _Exact(**{**estimated, **true}, true_strides=strides, true_phases=phases)
 
 
 def _at_contacts(stride: Stride, exact: SyntheticTrial) -> Stride:

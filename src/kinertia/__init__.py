@@ -64,7 +64,6 @@ if TYPE_CHECKING:
     from kinertia.motion.dynamics import residual as residual
     from kinertia.report.comparison.what_changed import compare as compare
     from kinertia.report.comparison.what_changed import compare_group as compare_group
-    from kinertia.report.exports.files import save_fit as save_fit
     from kinertia.report.exports.saved_fit import load_fit as load_fit
     from kinertia.settings import Attached as Attached
     from kinertia.settings import Instruments as Instruments
@@ -140,7 +139,6 @@ _ROOMS = {
     "studies.plan": "Plan plan",
     "cohort.tables": "read_cohort",
     "report.comparison.what_changed": "compare compare_group",
-    "report.exports.files": "save_fit",
     "report.exports.saved_fit": "load_fit",
 }
 """Where the public names are, from the lowest room up."""

@@ -20,7 +20,6 @@ from kinertia.cli.cohort import _LOCK
 from kinertia.cohort.cluster import doubts_of_workers
 from kinertia.errors import how_to_install
 from kinertia.io.working_folder import sole_use
-from kinertia.report.exports.files import save_fit
 from kinertia.workflow.from_files import fit_subject
 
 
@@ -161,7 +160,7 @@ def test_a_cohort_whose_workers_are_killed_is_finished_and_a_rerun_fits_nobody(s
             np.testing.assert_array_equal(rows[column], alone[column])
     assert not (out / "people" / "Clara").exists()
     (tmp_path / "calm").mkdir()
-    save_fit(fit_subject(study / "Anna" / "subject.toml"), tmp_path / "calm", None)
+    fit_subject(study / "Anna" / "subject.toml").save(tmp_path / "calm")
     calm, found = hashes(tmp_path / "calm"), hashes(out / "people" / "Anna")
     with_seconds_and_command = {"fit.json", "fit.npz", "report.html", ".kinertia.json"}
     assert {name for name in calm if calm[name] != found[name]} <= with_seconds_and_command

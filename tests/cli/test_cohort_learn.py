@@ -49,11 +49,12 @@ def quick(fit):
         estimate = type(fit.estimate).from_table(fit.estimate.segments, table)
         return replace(fit, estimate=estimate, subject=fit.subject.model_copy(update={"name": wanted.subject.name}))
 
-    def saved(fit, folder, provenance, force):
-        write_fit(fit, provenance, folder / FIT_FILE)
+    def saved(content, folder, force):
+        write_fit(*content, folder / FIT_FILE)
 
     with (
         mock.patch("kinertia.cohort.worker.fit_subject", fitted),
+        mock.patch("kinertia.cohort.worker.content_of", lambda *given: given),
         mock.patch("kinertia.cohort.worker.save_fit", saved),
         mock.patch("kinertia.cli.cohort.fit_here", in_this_process),
         mock.patch("kinertia.cohort.learning.in_parallel", lambda task, cases, *_: [task(case) for case in cases]),

@@ -14,7 +14,6 @@ from kinertia.io.text.sto import read_sto
 from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.motion.ground_reactions import measured_reactions
 from kinertia.motion.smoothing import smooth
-from kinertia.report.exports.files import save_fit
 from kinertia.report.exports.saved_fit import load_fit
 from kinertia.report.figures.cycle_figures import cycle_figure, cycle_figures, mean_curve, usual_mean
 from kinertia.report.figures.time_figures import moment_figure
@@ -144,7 +143,7 @@ def test_frames_that_were_not_measured_are_gaps(short_fit):
 
 
 def test_files_say_what_the_functions_say(fit, cycles, tmp_path):
-    folder = save_fit(fit, tmp_path / "out")
+    folder = fit.save(tmp_path / "out")
     names = {"cycles.csv": cycles, "cycles_literature.csv": fit.cycles("literature")}
     for name, expected in {**names, "spatiotemporal.csv": fit.spatiotemporal}.items():
         cells = (folder / name).read_text(encoding="utf-8").replace("\n", ",").split(",")
@@ -335,7 +334,8 @@ def next_to_opensim(fit_with_model, measured_folder):
     spline = smooth(
         coordinates.index.to_numpy(), np.where(trial.skeleton.rotational, np.radians(values), values), OPENSIM_FILTER_HZ
     )
-    k = replace(trial.kinematics, spline=spline, windows_s=((spline.time[0], spline.time[-1]),), known=None)
+    windows_s, unknown = ((spline.time[0], spline.time[-1]),), np.zeros_like(trial.kinematics.known)
+    k = replace(trial.kinematics, spline=spline, windows_s=windows_s, known=unknown)
     usual = inverse_dynamics(fit.skeleton, fit.literature, k.motion, measured_reactions(k).at(k.time))
     moved = replace(trial, kinematics=k, motion=k.motion, joint_loads={"literature": usual}, joint_curves=None)
     known = (stride.time >= moments.index[0]) & (stride.time <= moments.index[-1])

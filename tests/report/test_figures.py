@@ -164,11 +164,11 @@ def test_moments_are_per_body_mass_and_have_bands_where_there_are_deviations(fit
 
 def test_without_joint_curves_moments_are_those_of_the_measured_windows(fit):
     trial, mass = fit.trials[0], fit.literature.total_mass_kg
-    older = replace(trial, joint_curves=None)
-    drawn = as_plotly(moment_figure(older, fit.skeleton, mass))
+    without = replace(trial, joint_curves=None)
+    drawn = as_plotly(moment_figure(without, fit.skeleton, mass))
     trace = next(t for t in drawn.data if t.name == "right, estimate")
     np.testing.assert_allclose(trace.y, trial.moments["estimate"]["hip_flexion_r"] / mass, rtol=1e-5)
-    assert joint_moment_figure(older, mass, "isb") is None
+    assert joint_moment_figure(without, mass, "isb") is None
 
 
 def test_joint_moments_over_time_are_shaded_where_a_side_is_not_known(fit):
@@ -389,5 +389,3 @@ def test_departures_are_from_the_prior_where_more_is_known_than_the_literature(f
     assert told.more_known
     np.testing.assert_array_equal(told.departures, np.zeros_like(fit.departures))
     assert "Change against the prior by the estimate" in change_figure(told).alt
-    of_before = replace(fit, posterior=replace(fit.posterior, prior_mean=None))
-    assert of_before.expected is fit.literature

@@ -26,7 +26,7 @@ from kinertia.io.subject.reader import read_subject, with_settings
 from kinertia.io.subject.tables import SubjectFile
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import inverse_dynamics
-from kinertia.report.exports.contents import summary
+from kinertia.report.exports.contents import content_of, summary
 from kinertia.report.exports.files import save_fit
 from kinertia.report.pages.truth_comparison import Truth
 from kinertia.settings import MethodName
@@ -149,7 +149,7 @@ def run_demo(
         of_method = [] if method == "simultaneous" else ["--method", method]
         provenance = provenance_of(wanted, command_line(["kinertia", "demo", *of_method, "-o", str(folder)]))
         fit = fit_subject(with_settings(wanted, method=method), progress)
-        save_fit(fit, work, provenance, truth_of(trial, fit), force=True)
+        save_fit(content_of(fit, provenance, truth_of(trial, fit)), work, force=True)
         demo = Demo(fit, trial, noise, folder / "lab" / "subject.toml")
         demo.table.to_csv(work / "bsp_truth.csv", index=False, lineterminator="\n")
     return demo
@@ -323,5 +323,5 @@ def run_measured_demo(folder: str | Path, progress: Progress = lambda stage, sha
         wanted = read_subject(write_measured_lab(work / "lab", progress))
         fit = fit_subject(wanted, progress)
         command = command_line(["kinertia", "demo", "--measured", "-o", str(folder)])
-        save_fit(fit, work, provenance_of(wanted, command), force=True)
+        save_fit(content_of(fit, provenance_of(wanted, command)), work, force=True)
     return fit

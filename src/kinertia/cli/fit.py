@@ -45,7 +45,7 @@ from kinertia.io.subject.provenance import provenance_of
 from kinertia.io.subject.reader import read_subject, subject_file_in, subject_from_options, with_settings
 from kinertia.io.subject.tables import SubjectFile
 from kinertia.report.exports.contents import FitContent, content_of
-from kinertia.report.exports.files import FIT_FILES, TRIAL_FILES, write_content
+from kinertia.report.exports.files import FIT_FILES, TRIAL_FILES, save_fit
 from kinertia.settings import MethodName, Overrule
 from kinertia.workflow.from_files import fit_subject
 
@@ -130,7 +130,7 @@ def fit(
                 with shown_progress() as progress:
                     result = fit_subject(run.wanted, progress, run.overrule)
                 content = content_of(result, provenance_of(run.wanted, run.command))
-                write_content(content, run.folder, force=True)
+                save_fit(content, run.folder, force=True)
         except KinertiaError as error:
             if len(runs) == 1:
                 raise

@@ -35,6 +35,7 @@ from kinertia.io.subject.reader import read_subject
 from kinertia.io.subject.tables import SubjectFile
 from kinertia.io.versions import VERSION
 from kinertia.report.comparison.what_changed import fit_session
+from kinertia.report.exports.contents import content_of
 from kinertia.report.exports.files import save_fit
 from kinertia.studies.parallel import one_thread
 from kinertia.workflow.from_files import fit_subject
@@ -99,8 +100,9 @@ def _save(fit: Fit, wanted: SubjectFile, job: Job, record: Record) -> None:
     """Save results, rows of the tables and the record, in one folder that appears at once."""
     folder = Place(job.cohort, job.person).results
     command = command_line(["kinertia", "fit", str(job.subject), "-o", str(folder)])
+    content = content_of(fit, provenance_of(wanted, command))
     with complete_folder(folder, "cohort") as work:
-        save_fit(fit, work, provenance_of(wanted, command), force=True)
+        save_fit(content, work, force=True)
         with_session = wanted.instruments.session is not None
         write_person(work, job.person, fit, session_date(wanted), with_session)
         (work / RECORD).write_text(record.text(), encoding="utf-8")

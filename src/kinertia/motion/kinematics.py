@@ -56,8 +56,7 @@ class Kinematics:
             known, with accelerations; in order.
         complete: whether all ground contact is measured in `windows_s`; if not, these are the stances of a leg that is
             on a plate, there are no residuals, and only what `known` says is known.
-        known: (n, c) marker frames in which the generalised force of each coordinate can be known (`known_forces`);
-            None in older files: as `windows_s`.
+        known: (n, c) marker frames in which the generalised force of each coordinate can be known (`known_forces`).
         notes: assumptions made so far.
         findings: which frames are used, and where inverse kinematics did not converge; the trial has its own findings.
     """
@@ -69,9 +68,9 @@ class Kinematics:
     cutoff_hz: float
     windows_s: tuple[tuple[float, float], ...]
     notes: tuple[str, ...]
-    findings: tuple[Finding, ...] = ()
-    known: np.ndarray | None = None
-    complete: bool = True
+    findings: tuple[Finding, ...]
+    known: np.ndarray
+    complete: bool
 
     @property
     def window_s(self) -> tuple[float, float]:
@@ -97,7 +96,7 @@ class Kinematics:
     def known_frames(self) -> np.ndarray:
         """Mask (n,) of the marker frames in which the generalised force of any coordinate is known."""
         inside = self.inside(self.trial.markers.time) & self.complete
-        result: np.ndarray = inside if self.known is None else inside | self.known.any(axis=1)
+        result: np.ndarray = inside | self.known.any(axis=1)
         return result
 
     @cached_property
@@ -115,8 +114,6 @@ class Kinematics:
     def trajectory_known(self) -> np.ndarray:
         """Mask (f, c) of `trajectory_frames` in which the generalised force of each coordinate is known."""
         inside = self.inside(self.trajectory_time)[:, None] & self.complete
-        if self.known is None:
-            return np.repeat(inside, len(self.ik.coordinates), axis=1)
         result: np.ndarray = self.known[self.trajectory_frames] | inside
         return result
 

@@ -9,9 +9,10 @@ from kinertia.estimation.result.mean_cycles import gait_profile
 from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.findings.finding import Severity
 from kinertia.io.norms_file import read_norms
+from kinertia.report.exports.contents import content_of
 from kinertia.report.exports.datasets import curve_dataset as curve_dataset
 from kinertia.report.exports.datasets import draw_dataset as draw_dataset
-from kinertia.report.exports.files import save_fit as save_fit
+from kinertia.report.exports.files import save_fit
 from kinertia.report.figures.plots import FitFigures, as_plotly
 from kinertia.report.figures.plots import save_figure as save_figure
 from kinertia.report.pages.finding_view import lines
@@ -33,6 +34,11 @@ def fit_html(fit: Fit) -> str:
         rows=bsp_rows(fit),
         information=fit.posterior is not None,
     )
+
+
+def saved(fit: Fit, folder: str | Path, force: bool = False) -> Path:
+    """Compute and write all result files of a fit."""
+    return save_fit(content_of(fit), folder, force)
 
 
 def trial_html(trial: Trial) -> str:

@@ -7,7 +7,6 @@ import pandas as pd
 import pytest
 
 from kinertia.estimation.result.fit import Fit
-from kinertia.report.exports.files import save_fit
 from kinertia.settings import Settings, Subject
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.estimate import estimate_bsp
@@ -52,7 +51,7 @@ def test_a_delay_that_few_frames_leave_open_is_no_other_with_other_knots(recordi
 
 
 def test_files_of_a_simultaneous_fit(of_files, tmp_path):
-    folder = save_fit(of_files, tmp_path / "out")
+    folder = of_files.save(tmp_path / "out")
     bsp = pd.read_csv(folder / "bsp.csv")
     assert len(bsp) == 120
     np.testing.assert_allclose(bsp["information"], 1 - (bsp["sd"] / bsp["prior_sd"]) ** 2, atol=1e-9)

@@ -17,7 +17,6 @@ from kinertia.report.comparison.side_by_side import (
     remarks,
     render_comparison,
 )
-from kinertia.report.exports.files import save_fit
 from kinertia.report.figures.coordinate_titles import same_segment, same_sign
 from report_page import Elements
 
@@ -153,7 +152,7 @@ def test_moments_are_those_of_cycles(fit):
 
 @pytest.mark.slow
 def test_the_command(fit, demo_run, tmp_path):
-    save_fit(moved(fit, "torso", 0, 3.0), tmp_path / "again")
+    moved(fit, "torso", 0, 3.0).save(tmp_path / "again")
     outcome = run("compare", demo_run[1], tmp_path / "again", "-o", tmp_path / "comparison")
     assert outcome.status == 0, outcome.err
     assert "1 of 120 body segment parameters changed beyond their error bars (mass of torso)" in " ".join(

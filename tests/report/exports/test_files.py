@@ -13,7 +13,7 @@ from kinertia.findings.finding import Severity
 from kinertia.io.output_folder import check_folder
 from kinertia.io.text.sto import read_sto
 from kinertia.report.exports.contents import summary
-from kinertia.report.exports.files import FIT_FILES, TRIAL_FILES, save_fit
+from kinertia.report.exports.files import FIT_FILES, TRIAL_FILES
 from kinertia.settings import Settings
 
 STAGES = {"literature", "corrected", "estimate"}
@@ -31,7 +31,7 @@ PARAMETERS = ["mass", "com_x", "com_y", "com_z", "ixx", "iyy", "izz", "ixy", "ix
 def saved(short_fit, tmp_path_factory):
     """One trial of the short fit alone, so that its files stand in the folder itself."""
     fit = replace(short_fit, trials=short_fit.trials[:1])
-    return fit, save_fit(fit, tmp_path_factory.mktemp("saved") / "new" / "out")
+    return fit, fit.save(tmp_path_factory.mktemp("saved") / "new" / "out")
 
 
 def test_files(saved):
@@ -186,7 +186,7 @@ def test_marker_rms_is_over_visible_markers(short_fit):
 
 
 def test_several_trials_have_a_folder_each(short_fit, tmp_path):
-    folder = save_fit(short_fit, tmp_path / "out")
+    folder = short_fit.save(tmp_path / "out")
     assert {path.name for path in folder.glob("[!.]*")} == {*FOR_ALL, "early", "late"}
     for name in ("early", "late"):
         assert {path.name for path in (folder / name).glob("[!.]*")} == RESULTS - FOR_ALL
@@ -197,7 +197,7 @@ def test_results_replace_older_ones_and_leave_other_files_alone(saved, tmp_path)
     fit, _ = saved
     (tmp_path / "fit.json").write_text('{"kinertia": "old"}')
     (tmp_path / "mine.txt").write_text("kept")
-    save_fit(fit, tmp_path, force=True)
+    fit.save(tmp_path, force=True)
     assert json.loads((tmp_path / "fit.json").read_text())["kinertia"] == version("kinertia")
     assert (tmp_path / "mine.txt").read_text() == "kept"
     assert {path.name for path in tmp_path.glob("[!.]*")} == RESULTS | {"mine.txt"}
@@ -226,7 +226,7 @@ def test_a_failure_while_writing_leaves_nothing(saved, tmp_path, monkeypatch):
 
     monkeypatch.setattr("kinertia.report.exports.files.write_table", full_disk)
     with pytest.raises(FileError, match=r"out: cannot be written \(No space left on device\)"):
-        save_fit(fit, tmp_path / "deep" / "out")
+        fit.save(tmp_path / "deep" / "out")
     assert list(tmp_path.iterdir()) == []
 
 

@@ -45,6 +45,7 @@ def fit(person: PersonFolder, progress: Progress) -> None:
     """Run `kinertia fit` on the subject file: the results, and the subject file that they are of."""
     from kinertia.diagnostics.result.suitability import suitability
     from kinertia.io.subject.provenance import provenance_of
+    from kinertia.report.exports.contents import content_of
     from kinertia.report.exports.files import save_fit
     from kinertia.report.pages.finding_view import digest
     from kinertia.report.pages.headline import impossible, purposes
@@ -57,8 +58,9 @@ def fit(person: PersonFolder, progress: Progress) -> None:
     windows = windows_of(wanted, {trial.name: longest_first(trial.kinematics.windows_s) for trial in result.trials})
     rated = purposes(suitability(result, result.findings, result.left_out), impossible(result))
     command = command_line(["kinertia", "fit", str(person.subject), "-o", str(person.results)])
+    content = content_of(result, provenance_of(wanted, command))
     with complete_folder(person.results, "app") as work:
-        save_fit(result, work, provenance_of(wanted, command), force=True)
+        save_fit(content, work, force=True)
         (work / SUBJECT).write_bytes(person.subject.read_bytes())
         ended = time.time()
         _write(

@@ -65,8 +65,7 @@ def soundness(context: ResultContext) -> Iterator[Finding]:
         yield finding("R201", iterations=Quantity(steps, "1"))
     yield from _impossible(fit)
     yield from _far_centres(fit) if fit.posterior is None else _far_parameters(fit)
-    whole = None if fit.posterior is None else fit.posterior.mahalanobis_distance
-    if whole is not None and whole.implausible:
+    if fit.posterior is not None and (whole := fit.posterior.mahalanobis_distance).implausible:
         yield _unlike(whole) if whole.one_sided is None else _side_heavier(whole.one_sided)
 
 

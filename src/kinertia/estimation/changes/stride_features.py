@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from kinertia.estimation.result.curve_source import CurveSource, Estimated
+from kinertia.estimation.result.curve_source import CurveSource
 from kinertia.estimation.result.cycles import spread_evenly
 from kinertia.estimation.result.drawn_fit import AT_ONCE, DrawnCurves, drawn_bodies, drawn_joints, kept_draws
 from kinertia.estimation.result.fit import Fit
@@ -134,7 +134,7 @@ def stride_features(
     )
 
 
-def event_means(trials: Sequence[Estimated], mass_kg: float) -> dict[Key, float]:
+def event_means(trials: Sequence[TrialFit], mass_kg: float) -> dict[Key, float]:
     """Return the features of all strides of these trials; moments over this mass."""
     strides = _Strides.of(trials)
     keys, weights, _ = strides.chosen(np.ones(len(strides.keys), dtype=bool))
@@ -143,7 +143,7 @@ def event_means(trials: Sequence[Estimated], mass_kg: float) -> dict[Key, float]
     return {key: float(mean) for key, mean in zip(named, means, strict=True) if np.isfinite(mean)}
 
 
-def stride_means(trials: Sequence[Estimated], mass_kg: float) -> dict[tuple[str, str], list[float]]:
+def stride_means(trials: Sequence[TrialFit], mass_kg: float) -> dict[tuple[str, str], list[float]]:
     """Return `event_means` by name ("moment knee_adduction loading") and side, one for each stride."""
     found: dict[tuple[str, str], list[float]] = {}
     for (_, name, side, _), value in event_means(trials, mass_kg).items():
@@ -170,7 +170,7 @@ class _Strides:
     few: np.ndarray
 
     @classmethod
-    def of(cls, trials: Sequence[Estimated]) -> "_Strides":
+    def of(cls, trials: Sequence[TrialFit]) -> "_Strides":
         strides = [
             [candidate for candidate in (*trial.strides, *trial.phases) if candidate.phase != "landing"]
             for trial in trials
@@ -245,7 +245,7 @@ def _later(stride: Stride, side: str, kind: str, edges: Sequence[float]) -> Stri
     return replace(stride, **later)
 
 
-def _columns(trial: Estimated, side: str) -> Iterator[tuple[str, bool, int]]:
+def _columns(trial: TrialFit, side: str) -> Iterator[tuple[str, bool, int]]:
     """Yield name and column of each angle, and of each component of joint moments, of a leg or of neither."""
     skeleton = trial.skeleton
     for base, columns in skeleton.sides.items():
@@ -267,7 +267,7 @@ def _means(curves: np.ndarray, weights: np.ndarray) -> np.ndarray:
     return np.where(unknown | ~(weights.sum(axis=2) > 0.0), np.nan, means).reshape(-1)
 
 
-def _curves_of(trials: Sequence[Estimated]) -> list[_Curves]:
+def _curves_of(trials: Sequence[TrialFit]) -> list[_Curves]:
     """Return the curves of trials, which are one draw of each."""
     return [_Single(CurveSource(trial, "estimate")) for trial in trials]
 

@@ -1,19 +1,16 @@
 """Evaluates the curves of a fitted trial at any time, wherever they are known; NaN elsewhere."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Literal, Protocol, Self, TypeAlias
+from typing import Literal, Self, TypeAlias
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from kinertia.estimation.result.trial_fit import JointCurves
+from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
-from kinertia.model.skeleton import Skeleton
-from kinertia.motion.dynamics import Motion
-from kinertia.motion.gait_cycle import Stride
-from kinertia.motion.ground_reactions import GroundReactions, measured_reactions
+from kinertia.motion.ground_reactions import measured_reactions
 from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.smoothing import equal_columns, interpolate
 from kinertia.trial.sampled_data import nearest_samples, runs, within
@@ -28,54 +25,10 @@ _QUINTIC = 6
 """Frames that a natural quintic spline needs."""
 
 
-class Estimated(Protocol):
-    """Interface of a fitted trial that the curves need; its attributes are those of `TrialFit`."""
-
-    @property
-    def name(self) -> str:
-        """Name of the trial."""
-
-    @property
-    def kinematics(self) -> Kinematics:
-        """Kinematics before the estimate."""
-
-    @property
-    def skeleton(self) -> Skeleton:
-        """The calibrated model."""
-
-    @property
-    def motion(self) -> Motion:
-        """Estimated motion at the frames of the measured windows."""
-
-    @property
-    def reactions(self) -> GroundReactions:
-        """Ground reactions that belong to the estimate."""
-
-    @property
-    def joint_loads(self) -> Mapping[str, np.ndarray]:
-        """Joint loads (w, c) N m, per stage."""
-
-    @property
-    def deviations(self) -> CurveDeviations | None:
-        """Standard deviations of the trial's curves, or None."""
-
-    @property
-    def joint_curves(self) -> JointCurves | None:
-        """Joint loads wherever they are known, or None."""
-
-    @property
-    def strides(self) -> tuple[Stride, ...]:
-        """Strides of the whole trial."""
-
-    @property
-    def phases(self) -> tuple[Stride, ...]:
-        """Phases of contacts that are part of no stride."""
-
-
 class CurveSource:
     """Quantities of a trial at any time; NaN where they are not known."""
 
-    def __init__(self, trial: Estimated, stage: Stage) -> None:
+    def __init__(self, trial: TrialFit, stage: Stage) -> None:
         self.kinematics, self.stage, curves = trial.kinematics, stage, trial.joint_curves
         k = trial.kinematics
         time, inner = k.trajectory_time, k.frames - k.trajectory_frames.start

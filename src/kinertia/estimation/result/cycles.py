@@ -15,7 +15,8 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from kinertia.estimation.result.curve_source import CurveSource, Estimated, Stage, tracked
+from kinertia.estimation.result.curve_source import CurveSource, Stage, tracked
+from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.motion.gait_cycle import PERCENT, FeetUnderPelvis, Stride, feet_under_pelvis
 from kinertia.motion.joint_moments import component_names, joint_and_side
@@ -71,7 +72,7 @@ CurvesByStage = Mapping[Stage, Sequence[CycleCurve]]
 
 
 def cycle_curves(
-    trial: Estimated, mass_kg: float, stage: Stage = "estimate", strides: Sequence[Stride] | None = None
+    trial: TrialFit, mass_kg: float, stage: Stage = "estimate", strides: Sequence[Stride] | None = None
 ) -> Iterator[CycleCurve]:
     """Yield all curves of a trial, stride by stride, except those that were measured nowhere.
 
@@ -87,7 +88,7 @@ def cycle_curves(
 
 
 def curves_by_stage(
-    trials: Sequence[Estimated],
+    trials: Sequence[TrialFit],
     mass_kg: float,
     most_strides: int | None = None,
     stages: Sequence[Stage] = ("estimate", "literature"),
@@ -112,7 +113,7 @@ class _TrackedStride(NamedTuple):
     angles: Mapping[str, np.ndarray]
 
 
-def _curves(trial: Estimated, mass_kg: float, stage: Stage, strides: Sequence[_TrackedStride]) -> Iterator[CycleCurve]:
+def _curves(trial: TrialFit, mass_kg: float, stage: Stage, strides: Sequence[_TrackedStride]) -> Iterator[CycleCurve]:
     source, skeleton, kinematics = CurveSource(trial, stage), trial.skeleton, trial.kinematics
     sides = skeleton.sides
     for stride, path, angles in strides:
@@ -138,8 +139,7 @@ def _curves(trial: Estimated, mass_kg: float, stage: Stage, strides: Sequence[_T
             base, side = joint_and_side(joint)
             if side in ("", stride.side):
                 names = [f"{name}_joint_moment" for name in component_names(base)]
-                own_sd = sd.joints[:, k, 0] / mass_kg if sd.joints is not None else np.full((len(time), 3), np.nan)
-                rows = zip(names, three[:, k].T, own_sd.T, strict=True)
+                rows = zip(names, three[:, k].T, (sd.joints[:, k, 0] / mass_kg).T, strict=True)
                 curves += [curve("joint_moment", *row) for row in rows]
         foot, directions = FEET.index(stride.side), _directions(path, stride.side)
         share = 100.0 / (mass_kg * GRAVITY_M_S2)
@@ -150,7 +150,7 @@ def _curves(trial: Estimated, mass_kg: float, stage: Stage, strides: Sequence[_T
         yield from (known_curve for known_curve in curves if np.isfinite(known_curve.value).any())
 
 
-def _tracked_strides(trial: Estimated, strides: Sequence[Stride]) -> list[_TrackedStride]:
+def _tracked_strides(trial: TrialFit, strides: Sequence[Stride]) -> list[_TrackedStride]:
     skeleton, kinematics = trial.skeleton, trial.kinematics
     paths = _paths(feet_under_pelvis(skeleton, kinematics), strides, kinematics.trial.belt)
     q = tracked(kinematics, np.concatenate([stride.time for stride in strides]), 0)
@@ -183,7 +183,7 @@ def _directions(path: np.ndarray, side: str) -> np.ndarray:
     return np.array([forward, [0.0, 1.0, 0.0], medial])
 
 
-def cycle_columns(trials: Sequence[Estimated], mass_kg: float, stage: Stage = "estimate") -> dict[str, Any]:
+def cycle_columns(trials: Sequence[TrialFit], mass_kg: float, stage: Stage = "estimate") -> dict[str, Any]:
     """Return the columns of `Fit.cycles`, by name."""
     return columns_of(curves_by_stage(trials, mass_kg, None, [stage])[stage])
 
@@ -210,7 +210,7 @@ def phase_columns(curves: Sequence[CycleCurve]) -> dict[str, Any]:
     }
 
 
-def spatiotemporal_columns(trials: Sequence[Estimated]) -> dict[str, list[Any]]:
+def spatiotemporal_columns(trials: Sequence[TrialFit]) -> dict[str, list[Any]]:
     """Return the columns of `Fit.spatiotemporal`, by name."""
     rows: list[dict[str, Any]] = []
     for trial in trials:

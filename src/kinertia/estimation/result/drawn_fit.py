@@ -38,12 +38,10 @@ def kept_draws(fit: Fit) -> PosteriorDraws:
     """Return the posterior draws stored with a fit.
 
     Raises:
-        KinertiaError: the fit has none.
+        KinertiaError: the fit is by the two-level method.
     """
     if fit.posterior is None:
         raise KinertiaError('the two-level method has no error bars to draw from: fit with method "simultaneous"')
-    if fit.posterior.draws is None:
-        raise KinertiaError("this result was saved by a version that kept no posterior draws; run kinertia fit again")
     return fit.posterior.draws
 
 

@@ -222,8 +222,7 @@ class Fit:
     @property
     def expected(self) -> BodySegmentParameters:
         """Mean of the prior: the literature's or the model's parameters, unless more was known."""
-        stated = None if self.posterior is None else self.posterior.prior_mean
-        return self.literature if stated is None else stated
+        return self.literature if self.posterior is None else self.posterior.prior_mean
 
     @property
     def more_known(self) -> bool:
@@ -266,7 +265,7 @@ class Fit:
         return float(sum(mass for segment, mass in rows if segment not in bodies))
 
     def save(self, folder: str | Path, force: bool = False) -> Path:
-        """Write all result files into a folder, as `kinertia.save_fit` does, and return the folder.
+        """Write all result files into a folder, with several trials a sub-folder for each, and return the folder.
 
         Args:
             folder: created if necessary.
@@ -275,7 +274,7 @@ class Fit:
         Raises:
             FileError: the folder holds such files, or cannot be written to.
         """
-        written: Path = report_function("save_fit")(self, folder, force=force)
+        written: Path = report_function("saved")(self, folder, force)
         return written
 
     def figure(self, name: str, path: str | Path, trial: str | None = None) -> Path:

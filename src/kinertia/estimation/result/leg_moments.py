@@ -147,8 +147,8 @@ def _where_known(output: ModelOutput, curves: JointCurves, convention: Conventio
 
 
 def _departures(fit: Fit, trial: TrialFit) -> Departures | None:
-    """Return the departures of the draws in a trial, at `output_times`; None if the fit has no draws."""
-    if fit.posterior is None or fit.posterior.draws is None:
+    """Return the departures of the draws in a trial, at `output_times`; None after two-level."""
+    if fit.posterior is None:
         return None
     k, kept = [fitted.name for fitted in fit.trials].index(trial.name), fit.posterior.draws
     here, numbers = _curves(trial), list(range(min(kept.count, _MOST_DRAWS)))

@@ -106,10 +106,7 @@ def mean_of_common(values: np.ndarray) -> np.ndarray:
 
 
 def fits_by_task(fit: Fit) -> dict[str, Fit]:
-    """Return the fit with the trials of each task that has strides: walks first, then the task with most strides.
-
-    A result of a version that knew no tasks has one, with an empty name.
-    """
+    """Return the fit with the trials of each task that has strides: walks first, then the task with most strides."""
     trials: dict[str, list[int]] = {}
     for k, trial in enumerate(fit.trials):
         if trial.strides:

@@ -87,12 +87,12 @@ class JointCurves:
     @property
     def moment_sd(self) -> np.ndarray | None:
         """Standard deviations (f, j, 3) of `joints["estimate"].moments`, N m."""
-        return None if self.deviations is None or self.deviations.joints is None else self.deviations.joints[:, :, 0]
+        return None if self.deviations is None else self.deviations.joints[:, :, 0]
 
     @property
     def force_sd(self) -> np.ndarray | None:
         """Standard deviations (f, j, 3) of `joints["estimate"].forces`, N."""
-        return None if self.deviations is None or self.deviations.joints is None else self.deviations.joints[:, :, 1]
+        return None if self.deviations is None else self.deviations.joints[:, :, 1]
 
     @classmethod
     def of(
@@ -118,11 +118,7 @@ class JointCurves:
             joints[name] = _only(joint_moments(skeleton, bsp, moved, loads), known_loads)
         if deviations is not None:
             masked = {kind: np.where(known, getattr(deviations, kind), np.nan) for kind in ("moments", "powers")}
-            three = (
-                None
-                if deviations.joints is None
-                else np.where(known_loads[:, :, None, None], deviations.joints, np.nan)
-            )
+            three = np.where(known_loads[:, :, None, None], deviations.joints, np.nan)
             deviations = replace(deviations, **masked, joints=three)
         return cls(time, known, motion, forces, joints, deviations)
 
@@ -192,7 +188,7 @@ class TrialFit:
         marker_errors_m: distances (w, m) between measured and model markers per stage: "ik", "final".
         seconds: computing time per stage.
         joint_curves: joint loads in three dimensions at the frames of `trajectory`, wherever they are known; None after
-            two-level and in older files.
+            two-level.
 
     Examples:
         >>> trial = fit.trials[0]  # fit = kinertia.fit_subject("subject.toml")
@@ -256,7 +252,7 @@ class TrialFit:
         """Mask (n, 2) of marker frames in which all joint moments of the right, left leg are known."""
         k, skeleton = self.kinematics, self.skeleton
         known = np.repeat((k.inside(k.trial.markers.time) & k.complete)[:, None], 2, axis=1)
-        if k.known is not None and self.joint_curves is not None:
+        if self.joint_curves is not None:
             for foot, segment in enumerate(skeleton.feet):
                 axes = np.unique(skeleton.map.owner[skeleton.support[skeleton.segments.index(segment)]])
                 known[:, foot] |= k.known[:, axes[axes >= len(skeleton.joints[0].axes)]].all(axis=1)

@@ -52,13 +52,13 @@ class Posterior:
         iterations: Gauss-Newton steps.
         base: combinations of parameters that these motions determine, and those that no motion determines.
         instruments: information of these trials on plates and synchronisation.
-        prior_mean: of the body segment parameters; None in older files, which lack it.
-        mahalanobis_distance: distance of the estimate from the prior; None in older files.
+        prior_mean: of the body segment parameters.
+        mahalanobis_distance: distance of the estimate from the prior.
         free_moment_sign: evidence on the sign; None if it was not tested.
         marker_distances_m: per trial, distance of each marker from its position in the nearest of the other trials, for
             markers that other trials have.
         down_weighted: per trial, the share of its measured frames that have less weight because of impact transients.
-        draws: of motion, parameters and calibration together; None in older files.
+        draws: of motion, parameters and calibration together.
         missing_loads: loads of which a part is missing; gains of these plates stay nominal.
 
     Examples:
@@ -74,12 +74,12 @@ class Posterior:
     iterations: int
     base: BaseParameters
     instruments: InstrumentInformation
-    prior_mean: BodySegmentParameters | None = None
-    mahalanobis_distance: MahalanobisDistance | None = None
+    prior_mean: BodySegmentParameters
+    mahalanobis_distance: MahalanobisDistance
     free_moment_sign: FreeMomentSign | None = None
     marker_distances_m: tuple[Mapping[str, float], ...] = field(default=())
     down_weighted: tuple[float, ...] = ()
-    draws: PosteriorDraws | None = None
+    draws: PosteriorDraws = field(kw_only=True)
     missing_loads: tuple[MissingLoad, ...] = ()
 
     @property

@@ -87,7 +87,7 @@ def _over_time(fit: Fit, kind: str) -> tuple[dict[str, Any], np.ndarray, np.ndar
     """Return coordinates, values and SDs by trial, time and joint."""
     times, names = _times(fit.trials), _names(fit, kind)
     if not names:
-        raise KinertiaError(f"no curves of {kind!r}: the two-level method and older results have none")
+        raise KinertiaError(f"no curves of {kind!r}: the two-level method has none")
     value, sd = np.full((2, len(fit.trials), len(times), len(names)), np.nan)
     for k, trial in enumerate(fit.trials):
         curve = _over_own_time(trial, kind)

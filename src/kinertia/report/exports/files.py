@@ -14,12 +14,10 @@ import numpy as np
 from kinertia.estimation.result.drawn_fit import chosen_draws, drawn_fit
 from kinertia.estimation.result.fit import Fit
 from kinertia.io.output_folder import complete_folder, expect_own_folder, write_then_rename
-from kinertia.io.subject.provenance import Provenance
 from kinertia.io.text.csv_file import inert
 from kinertia.io.text.sto import write_table
-from kinertia.report.exports.contents import FitContent, Model, TrialContent, content_of, model_of, opensim_content
+from kinertia.report.exports.contents import FitContent, Model, TrialContent, model_of, opensim_content
 from kinertia.report.exports.saved_fit import FIT_FILE, write_fit
-from kinertia.report.pages.truth_comparison import Truth
 
 FIT_FILES = ("fit.json", FIT_FILE, "report.html", "bsp.csv", "model.osim")
 """Names of results that every fit has."""
@@ -28,30 +26,18 @@ TRIAL_FILES = ("kinematics.mot", "ground_reactions.mot", "external_loads.xml", "
 _ALL_DIGITS, _SIX_DIGITS = "%r", "%.6g"
 
 
-def save_fit(
-    fit: Fit,
-    folder: str | Path,
-    provenance: Provenance | None = None,
-    truth: Truth | None = None,
-    force: bool = False,
-) -> Path:
+def save_fit(content: FitContent, folder: str | Path, force: bool = False) -> Path:
     """Write all result files of a fit into a folder, which is made if necessary, and return the folder.
 
-    With one trial its files are in the folder itself, with several in a sub-folder per trial. The report states
-    command and files given by `provenance`, and shows the truth of a synthetic person. With `force` also among
-    files that are not results of Kinertia; a file with the name of a result is refused.
+    With one trial its files are in the folder itself, with several in a sub-folder per trial.
+
+    Args:
+        content: of the files, as `content_of` computes it.
+        folder: folder to write to.
+        force: write also among files that are not results of Kinertia; a file with the name of a result is refused.
 
     Raises:
         FileError: the folder holds such files, or cannot be written to.
-    """
-    return write_content(content_of(fit, provenance, truth), folder, force)
-
-
-def write_content(content: FitContent, folder: str | Path, force: bool = False) -> Path:
-    """Write the content of all result files, as `save_fit` does.
-
-    Raises:
-        FileError: as `save_fit`.
     """
     if not force:
         expect_own_folder(folder, ", or force=True to write among them")

@@ -88,12 +88,7 @@ def read_saved(folder: str | Path) -> SavedFit:
     if not Path(folder).is_dir():
         raise FileError(folder, "no such folder; give one that kinertia fit has written")
     if not path.is_file():
-        older = (Path(folder) / "fit.json").is_file()
-        problem = f"holds no {FIT_FILE}: " + (
-            "these results are from a version that did not write it; run kinertia fit again"
-            if older
-            else "no results of kinertia fit here; give the folder named by its option -o"
-        )
+        problem = f"holds no {FIT_FILE}: no results of kinertia fit here; give the folder that it wrote"
         raise FileError(folder, problem)
     saved = read_archive(path, _KINDS)
     if not isinstance(saved, SavedFit):

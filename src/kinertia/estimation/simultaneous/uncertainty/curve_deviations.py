@@ -44,14 +44,14 @@ class CurveDeviations:
         powers: (d, c) of joint moment times speed, W.
         ground_forces: (d, 2, 3) of the ground reactions on right and left foot, N: from the instrument corrections and
             the plates' own noise.
-        joints: (d, j, 2, 3) of the moments (N m) and forces (N) of `joint_moments`; None in older files.
+        joints: (d, j, 2, 3) of the moments (N m) and forces (N) of `joint_moments`.
     """
 
     coordinates: np.ndarray
     moments: np.ndarray
     powers: np.ndarray
     ground_forces: np.ndarray
-    joints: np.ndarray | None = None
+    joints: np.ndarray
 
     def and_of(self, other: CurveDeviations) -> CurveDeviations:
         """Combine with other, independent standard deviations."""
@@ -60,8 +60,7 @@ class CurveDeviations:
     @property
     def curves(self) -> tuple[np.ndarray, ...]:
         """The standard deviations of all curves, in the order of the attributes."""
-        every = (getattr(self, field.name) for field in fields(self))
-        return tuple(curve for curve in every if curve is not None)
+        return tuple(getattr(self, field.name) for field in fields(self))
 
     def roots(self) -> CurveDeviations:
         """Convert variances to standard deviations, in place."""
@@ -163,7 +162,6 @@ class _Curves:
     @property
     def of_joints(self) -> np.ndarray:
         """Variances (d, j, 2, 3) of the joints' moments and forces."""
-        assert self.variance.joints is not None
         return self.variance.joints
 
     def add(self, branch: Branch, root: np.ndarray, end: EndSpread) -> None:
