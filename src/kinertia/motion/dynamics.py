@@ -204,10 +204,10 @@ def required_loads(
     """Compute the loads (s, n, 6) of segments with parameters (s, 10): `regressor` times these, in less memory."""
     n, count = x.shape
     segments = len(tree.last_axis)
-    result = np.zeros((segments, n, 6))
+    result = np.zeros((segments, n, 6, 1))
     frame = empty_frame(count, gravity_m_s2)
     rotation, translation = np.empty((segments, 3, 3)), np.empty((segments, 3))
-    w, e, b, in_body, load = np.empty(3), np.empty(3), np.empty(3), np.empty((6, 10)), np.empty(6)
+    w, e, b, in_body, load = np.empty(3), np.empty(3), np.empty(3), np.empty((6, 10)), np.empty((6, 1))
     for k in range(n):
         move(tree, x[k], v[k], a[k], frame)
         place_segments(tree, frame.rotation, frame.translation, rotation, translation)
@@ -218,23 +218,11 @@ def required_loads(
             in_segment(frame.velocity[last_axis], frame.acceleration[last_axis], rotation[s], translation[s], w, e, b)
             own_regressor(w, e, b, in_body)
             for r in range(6):
-                load[r] = 0.0
+                load[r, 0] = 0.0
                 for c in range(10):
-                    load[r] += in_body[r, c] * parameters[s, c]
-            _load_to_ground(rotation[s], translation[s], about[k], load, result[s, k])
-    return result
-
-
-@part
-def _load_to_ground(rotation: np.ndarray, at: np.ndarray, about: np.ndarray, load: np.ndarray, out: np.ndarray) -> None:
-    """Write a load (6,) in ground axes and about another point to `out`; the segment's origin is at `at`."""
-    x, y, z = at[0] - about[0], at[1] - about[1], at[2] - about[2]
-    for r in range(3):
-        out[r] = rotation[r, 0] * load[0] + rotation[r, 1] * load[1] + rotation[r, 2] * load[2]
-        out[3 + r] = rotation[r, 0] * load[3] + rotation[r, 1] * load[4] + rotation[r, 2] * load[5]
-    out[3] += y * out[2] - z * out[1]
-    out[4] += z * out[0] - x * out[2]
-    out[5] += x * out[1] - y * out[0]
+                    load[r, 0] += in_body[r, c] * parameters[s, c]
+            to_ground(rotation[s], translation[s], about[k], load, result[s, k])
+    return result[..., 0]
 
 
 @part
@@ -295,9 +283,9 @@ def own_regressor(w: np.ndarray, e: np.ndarray, b: np.ndarray, out: np.ndarray) 
 
 @part
 def to_ground(rotation: np.ndarray, at: np.ndarray, about: np.ndarray, in_body: np.ndarray, out: np.ndarray) -> None:
-    """Write the regressor (6, 10) in ground axes and about another point to `out`; the segment's origin is at `at`."""
+    """Write a regressor (6, 10) or load (6, 1) in ground axes, about another point, to `out`; the origin is at `at`."""
     x, y, z = at[0] - about[0], at[1] - about[1], at[2] - about[2]
-    for c in range(10):
+    for c in range(in_body.shape[1]):
         for r in range(3):
             out[r, c] = rotation[r, 0] * in_body[0, c] + rotation[r, 1] * in_body[1, c] + rotation[r, 2] * in_body[2, c]
             out[3 + r, c] = (
