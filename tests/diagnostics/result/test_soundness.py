@@ -36,7 +36,9 @@ def found(posterior=None, **changes):
         "literature": BODY,
         "posterior": None
         if posterior is None
-        else SimpleNamespace(**{"mahalanobis_distance": None, "iterations": 7, **posterior}),
+        else SimpleNamespace(
+            **{"mahalanobis_distance": SimpleNamespace(implausible=False), "iterations": 7, **posterior}
+        ),
         "file": None,
         "expected": changes.get("literature", BODY),
         "more_known": False,
