@@ -9,6 +9,7 @@ import typer
 
 from kinertia.cli.common import Outcome, Overwrite, Quiet, out, results_folder, shown_progress
 from kinertia.errors import FileError
+from kinertia.estimation.changes.session_changes import one_session_note
 from kinertia.estimation.result.cycles import columns_of
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.gait_scores import with_norms
@@ -29,7 +30,7 @@ from kinertia.report.comparison.side_by_side import (
     remarks,
     render_comparison,
 )
-from kinertia.report.comparison.what_changed import Comparison, compared_sessions, fit_of, opened
+from kinertia.report.comparison.what_changed import Comparison, compared_sessions, fit_of, noted, opened
 from kinertia.report.comparison.what_changed import compare as compare_sessions
 from kinertia.report.exports.c3d_results import write_c3d_results
 from kinertia.report.exports.files import write_columns, write_draws
@@ -86,6 +87,7 @@ def compare(
     with shown_progress() as progress:
         fits = {name: fit_of(source, progress) for name, source in zip(names, sources, strict=True)}
         found, reason = compared_sessions(list(fits.values()), conditions, progress, norms)
+    found = None if found is None else noted(found, one_session_note(sources))
     page = render_comparison(fits, None if found is None else found.shown(), reason)
     with complete_folder(output, "compare") as work:
         (work / "compare.html").write_text(page, encoding="utf-8")

@@ -9,6 +9,7 @@ import kinertia
 from command_line import run
 from kinertia.errors import FileError, KinertiaError
 from kinertia.estimation.changes.change import PRIMARY, Change
+from kinertia.estimation.changes.session_changes import one_session_note, tasks_note
 from kinertia.estimation.result.fit import Fit
 from kinertia.io.subject.tables import SubjectFile
 from kinertia.report.comparison import what_changed
@@ -132,10 +133,19 @@ def test_each_outcome_says_whether_it_remains_among_many():
     assert [row["discovered"] for row in changes_summary("a", "b", found, None, ())["outcomes"]] == expected
 
 
+def test_subject_files_of_one_session_are_better_compared_by_conditions(write, tmp_path, demo_run):
+    first, other = opened([write("first", ""), write("other", "")], None)
+    assert "--conditions" in one_session_note([first, other])
+    (tmp_path / "later.trc").write_text("markers put on anew")
+    later = other.model_copy(update={"model": other.model.model_copy(update={"static": tmp_path / "later.trc"})})
+    assert one_session_note([first, later]) == ""
+    assert one_session_note([first, *opened([demo_run[1], first], None)[:1]]) == ""
+
+
 def test_tasks_that_differ_are_noted():
     def walks(*tasks):
         return [SimpleNamespace(kinematics=SimpleNamespace(trial=SimpleNamespace(task=task))) for task in tasks]
 
-    assert what_changed._tasks_note((walks("walk", "walk"), walks("walk"))) == ""
-    assert "walk before, turn after" in what_changed._tasks_note((walks("walk"), walks("turn")))
-    assert "turn and walk" in what_changed._tasks_note((walks("walk", "turn"), walks("turn", "walk")))
+    assert tasks_note((walks("walk", "walk"), walks("walk"))) == ""
+    assert "walk before, turn after" in tasks_note((walks("walk"), walks("turn")))
+    assert "turn and walk" in tasks_note((walks("walk", "turn"), walks("turn", "walk")))

@@ -42,6 +42,8 @@ from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import PosteriorDraws
 from kinertia.findings.finding import Finding, Severity
+from kinertia.io.subject.provenance import sha256
+from kinertia.io.subject.tables import SubjectFile
 from kinertia.model.anatomy import segment_of
 from kinertia.model.gait27 import AXIS_TILTS, VIRTUAL_TRUNK
 from kinertia.settings import Subject
@@ -224,6 +226,27 @@ def unjudged_changes(
                 np.nan,
                 doubt=doubt,
             )
+
+
+def tasks_note(walks: tuple[Trials, Trials]) -> str:
+    """State the tasks of both where they differ, and which are averaged together."""
+    before, after = (sorted({trial.kinematics.trial.task for trial in trials} - {""}) for trials in walks)
+    if before != after:
+        return f"Tasks differ: {' and '.join(before)} before, {' and '.join(after)} after."
+    return f"Averages are over {' and '.join(before)} together." if len(before) > 1 else ""
+
+
+def one_session_note(sources: Sequence[Fit | SubjectFile]) -> str:
+    """State how two subject files with the same static trial or model are compared better; else empty."""
+    files = [
+        source.model.static or source.model.osim if isinstance(source, SubjectFile) else None for source in sources
+    ]
+    if None in files or len({sha256(path) for path in files if path is not None}) > 1:
+        return ""
+    return (
+        "Both name the same static trial or model. If markers stayed in place, compare all trials in one subject file "
+        "by --conditions: errors of marker placement then cancel."
+    )
 
 
 def session_features(

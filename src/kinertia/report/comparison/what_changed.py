@@ -26,14 +26,15 @@ from kinertia.estimation.changes.condition_changes import (
 from kinertia.estimation.changes.curve_changes import CurveChange, apart, curve_changes, paired, rows_of
 from kinertia.estimation.changes.session_changes import (
     Session,
-    Trials,
     changes_between,
     grows,
     identity_note,
     instrument_doubts,
+    one_session_note,
     other_sex,
     session,
     session_features,
+    tasks_note,
     unjudged_changes,
     why_incomparable,
     why_unjudged,
@@ -211,7 +212,13 @@ def compare(
         fit = fit_subject(source, progress) if isinstance(source, SubjectFile) else source
         assert conditions is not None
         return _of_conditions(fit, conditions, progress, norms)
-    return _of_sessions([fit_of(source, progress) for source in sources], conditions, progress, norms)
+    found = _of_sessions([fit_of(source, progress) for source in sources], conditions, progress, norms)
+    return noted(found, one_session_note(sources))
+
+
+def noted(found: Comparison, more: str) -> Comparison:
+    """Return a comparison with one more limit of it, unless that is empty."""
+    return replace(found, note=" ".join(filter(None, (found.note, more))))
 
 
 def opened(sources: Sequence[Source], conditions: tuple[str, str] | None) -> list[Fit | SubjectFile]:
@@ -293,8 +300,8 @@ def _of_sessions(
     curves = curve_changes(rows.curves, later.curves, apart)
     found = _comparison(names, first, other, outcomes, curves, norms)
     narrow = _NARROW if first.narrow_markers or other.narrow_markers else ""
-    noted = replace(found, note=" ".join(filter(None, (found.note, narrow))), person=person)
-    return noted if not person or grows(before) else _doubted(noted, person)
+    found = noted(replace(found, person=person), narrow)
+    return found if not person or grows(before) else _doubted(found, person)
 
 
 def _doubted(found: Comparison, why: str) -> Comparison:
@@ -351,15 +358,7 @@ def _comparison(
     )
     walks = first.trials, other.trials
     gait = gait_changes(*walks) + (() if norms is None else _profiles(first, other, read_norms(norms)))
-    return Comparison(*names, judged, speed_change(*walks), gait, tuple(curves), doubt, _tasks_note(walks))
-
-
-def _tasks_note(walks: tuple[Trials, Trials]) -> str:
-    """State the tasks of both where they differ, and which are averaged together."""
-    before, after = (sorted({trial.kinematics.trial.task for trial in trials} - {""}) for trials in walks)
-    if before != after:
-        return f"Tasks differ: {' and '.join(before)} before, {' and '.join(after)} after."
-    return f"Averages are over {' and '.join(before)} together." if len(before) > 1 else ""
+    return Comparison(*names, judged, speed_change(*walks), gait, tuple(curves), doubt, tasks_note(walks))
 
 
 def _profiles(first: Session, other: Session, norms: Mapping[str, Norm]) -> tuple[Change, ...]:
