@@ -1,6 +1,7 @@
 """What is compared is read, and refused, before anything is estimated; what limits a comparison is stated."""
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -13,7 +14,7 @@ from kinertia.estimation.changes.session_changes import one_session_note, tasks_
 from kinertia.estimation.result.fit import Fit
 from kinertia.io.subject.tables import SubjectFile
 from kinertia.report.comparison import what_changed
-from kinertia.report.comparison.change_tables import change_columns, changes_summary, lacking_sentence
+from kinertia.report.comparison.change_tables import change_columns, change_sentences, changes_summary, lacking_sentence
 from kinertia.report.comparison.what_changed import opened
 
 
@@ -121,6 +122,17 @@ def test_a_leg_whose_moments_are_not_known_is_named():
     assert "right" not in lacking_sentence(right)
     some = [*right, changed("l", PRIMARY[0])]
     assert "mid-stance" not in lacking_sentence(some)
+
+
+def test_what_keeps_an_outcome_from_being_judged_is_in_its_sentence():
+    known = changed("r", PRIMARY[0])
+    for doubt, named in (
+        ("P282: beside the plate. P213: offset", "P282, P213"),
+        ("Masses differ: one person?", "person"),
+    ):
+        (sentence,) = change_sentences([replace(known, doubt=doubt)])
+        assert named in sentence
+        assert "cannot be judged" in sentence
 
 
 def test_each_outcome_says_whether_it_remains_among_many():

@@ -1,5 +1,6 @@
 """Shows what changed between two conditions: words, tables, and curves with their bands."""
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, fields
 from typing import Any
@@ -83,7 +84,9 @@ def _judgement(change: Change) -> str:
     if change.doubt and np.isnan(change.sd):
         return f"went {pair}; whether that is a change cannot be judged, since {change.doubt}"
     if change.doubt:
-        return f"went {pair}; whether that is a change cannot be judged here, for the reason that is stated"
+        codes = ", ".join(re.findall(r"\b[A-Z]\d{3}(?=:)", change.doubt))
+        reason = f"due to {codes}, stated below" if codes else "since it is not certain that both are one person"
+        return f"went {pair}; whether that is a change cannot be judged, {reason}"
     if change.verdict == "cannot be judged":
         return f"went {pair}; {change.strides[0]} and {change.strides[1]} repeats cannot show whether that is a change"
     if change.verdict == "changed":
