@@ -84,6 +84,8 @@ def compare(
     results_folder(output, overwrite)
     names = names_from_common_folder(paths)
     sources = opened(paths, conditions)
+    if norms is not None:
+        read_norms(norms)  # before the work: what is wrong with them
     with shown_progress() as progress:
         fits = {name: fit_of(source, progress) for name, source in zip(names, sources, strict=True)}
         found, reason = compared_sessions(list(fits.values()), conditions, progress, norms)

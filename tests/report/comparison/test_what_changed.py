@@ -84,6 +84,27 @@ def test_a_folder_of_results_or_with_a_subject_file_is_found(write, tmp_path, de
         opened([tmp_path / "subject 0.trc", path], None)
 
 
+def test_norms_are_read_before_anything_is_estimated(write, tmp_path):
+    path = write("Anna", "normal", "toe out")
+    with pytest.raises(FileError) as error:
+        kinertia.compare(path, conditions=("normal", "toe out"), norms=tmp_path / "norms.csv")
+    assert error.value.path.name == "norms.csv"
+    outcome = run(
+        "compare",
+        path,
+        write("Anna again", "normal"),
+        "--conditions",
+        "normal",
+        "normal",
+        "--norms",
+        tmp_path / "norms.csv",
+        "-o",
+        tmp_path / "c",
+        "--json",
+    )
+    assert "norms.csv" in json.loads(outcome.out)["error"]
+
+
 def test_the_command_says_what_to_give_instead(write, tmp_path):
     path = write("Anna", "normal", "toe out")
     for arguments, named in (

@@ -73,6 +73,7 @@ _NARROW = (
     "A result takes its markers as placed within 5 mm: between days, angles differ by more than its intervals allow. "
     "Give the subject files instead."
 )
+Norms = Mapping[str, Norm] | None
 Source = Fit | SubjectFile | str | Path
 MARKER_SD_M = 0.010
 """Of marker positions in their segments: 5 mm each, and 5 mm that markers of a segment share. As independent errors, 10
@@ -207,12 +208,13 @@ def compare(
         KinertiaError: they cannot be compared; it says why.
     """
     sources = opened([before] if after is None else [before, after], conditions)
+    known = None if norms is None else read_norms(norms)
     if after is None:
         (source,) = sources
         fit = fit_subject(source, progress) if isinstance(source, SubjectFile) else source
         assert conditions is not None
-        return _of_conditions(fit, conditions, progress, norms)
-    found = _of_sessions([fit_of(source, progress) for source in sources], conditions, progress, norms)
+        return _of_conditions(fit, conditions, progress, known)
+    found = _of_sessions([fit_of(source, progress) for source in sources], conditions, progress, known)
     return noted(found, one_session_note(sources))
 
 
@@ -273,7 +275,7 @@ def _stated(source: Fit | SubjectFile) -> list[str]:
     return [trial.condition for trial in source.trials if trial.use == "all"]
 
 
-def _of_conditions(fit: Fit, conditions: tuple[str, str], progress: Progress, norms: str | Path | None) -> Comparison:
+def _of_conditions(fit: Fit, conditions: tuple[str, str], progress: Progress, norms: Norms) -> Comparison:
     """Compare two conditions of one estimate."""
     first, other = (session(fit, name) for name in conditions)
     features, condition = condition_features(fit, *conditions, partial(progress, "comparison"))
@@ -284,7 +286,7 @@ def _of_conditions(fit: Fit, conditions: tuple[str, str], progress: Progress, no
 
 
 def _of_sessions(
-    fits: Sequence[Fit], conditions: tuple[str, str] | None, progress: Progress, norms: str | Path | None
+    fits: Sequence[Fit], conditions: tuple[str, str] | None, progress: Progress, norms: Norms
 ) -> Comparison:
     """Compare two sessions of one person."""
     before, after = fits
@@ -347,7 +349,7 @@ def _comparison(
     other: Session,
     outcomes: Iterable[Change],
     curves: Iterable[CurveChange],
-    norms: str | Path | None,
+    norms: Norms,
 ) -> Comparison:
     """Add speed, steps and doubts about instruments."""
     doubts = instrument_doubts((first.fit, first.trials), (other.fit, other.trials))
@@ -357,7 +359,7 @@ def _comparison(
         for outcome in outcomes
     )
     walks = first.trials, other.trials
-    gait = gait_changes(*walks) + (() if norms is None else _profiles(first, other, read_norms(norms)))
+    gait = gait_changes(*walks) + (() if norms is None else _profiles(first, other, norms))
     return Comparison(*names, judged, speed_change(*walks), gait, tuple(curves), doubt, tasks_note(walks))
 
 
