@@ -45,7 +45,7 @@ LETTER = "letter.html"
 def compare(
     results: Annotated[
         list[Path],
-        typer.Argument(help="Two sessions, or more results; one with --conditions."),
+        typer.Argument(help="Two sessions or several results; one with --conditions."),
     ],
     conditions: Annotated[
         tuple[str, str] | None,

@@ -24,19 +24,17 @@ class Start:
     Attributes:
         word: name in headings and legends.
         phrase: name in sentences.
-        whose: possessive, "the literature's" or "the model's".
         values: name of the stage of residuals and moments.
     """
 
     word: str
     phrase: str
-    whose: str
     values: str
 
 
-LITERATURE = Start("literature", "the literature", "the literature's", "literature values")
-MODEL = Start("model", "the model", "the model's", "the model's own values")
-PRIOR = Start("prior", "the prior", "the prior's", "prior values")
+LITERATURE = Start("literature", "the literature", "literature values")
+MODEL = Start("model", "the model", "the model's own values")
+PRIOR = Start("prior", "the prior", "prior values")
 
 
 def start_of(person: Fit | Prepared) -> Start:

@@ -52,7 +52,7 @@ def test_without_error_bars_nothing_is_called_changed(fit, two_level):
 
 
 def test_error_bars_are_explained_where_there_are_any(fit, two_level):
-    explained = ("beyond 1.96 times its SD", "by more than the error bars say", "± sd")
+    explained = ("beyond 1.96 times its SD", "which of them exceed the error bars", "± sd")
     without = Elements(render_comparison({"a": fit, "b": two_level})).text
     assert not [words for words in explained if words in without]
     assert "the two-level method gives no error bars, so a change cannot be distinguished from chance: b" in without

@@ -154,6 +154,10 @@ def test_what_keeps_an_outcome_from_being_judged_is_in_its_sentence():
         (sentence,) = change_sentences([replace(known, doubt=doubt)])
         assert named in sentence
         assert "cannot be judged" in sentence
+    single = replace(known, sd=np.nan)
+    for doubt, stated in (("Masses differ: one person? State ages.", False), ("their models differ", True)):
+        (sentence,) = change_sentences([replace(single, doubt=doubt)])
+        assert (doubt in sentence) is stated, "a note of several sentences is stated by itself"
 
 
 def test_each_outcome_says_whether_it_remains_among_many():

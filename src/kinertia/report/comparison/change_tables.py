@@ -81,7 +81,7 @@ def _judgement(change: Change) -> str:
     """State what became of an outcome, as the predicate of a sentence that a clinician may copy."""
     digits = _DIGITS[change.unit]
     pair = f"from {change.before:.{digits}f} to {change.after:.{digits}f} {change.unit}"
-    if change.doubt and np.isnan(change.sd):
+    if change.doubt and np.isnan(change.sd) and not change.doubt.endswith("."):
         return f"went {pair}; whether that is a change cannot be judged, since {change.doubt}"
     if change.doubt:
         codes = ", ".join(re.findall(r"\b[A-Z]\d{3}(?=:)", change.doubt))

@@ -70,8 +70,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _NARROW = (
-    "A result takes its markers as placed within 5 mm: between days, angles differ by more than its intervals allow. "
-    "Give the subject files instead."
+    "A saved result assumes markers placed within 5 mm; between days, angles differ by more than its intervals allow. "
+    "Compare the subject files instead."
 )
 Norms = Mapping[str, Norm] | None
 Source = Fit | SubjectFile | str | Path

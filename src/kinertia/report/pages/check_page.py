@@ -280,6 +280,7 @@ def _plate(plates: PlateLoads, p: int) -> dict[str, Any]:
         "X": ring[:, 0],
         "Z": ring[:, 2],
         "name": "plate",
+        "showlegend": False,
         "text": plain(plates.names[p]),
         "hoverinfo": "text",
     } | look

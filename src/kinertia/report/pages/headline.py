@@ -133,11 +133,10 @@ def _knowledge(fit: Fit, held: str, hidden: int) -> tuple[str, ...]:
     posterior = fit.posterior
     grades = fit.evidence[posterior.prior_sd > 0].tolist()
     counts = {word: grades.count(word) for word in _EVIDENCE}
-    whose = expected_of(fit).whose
     sentences = [
         f"of {len(grades)} parameters {counts['measured']} are well informed by the data (information above "
         f"{100 * MEASURED:g} %), {counts['informed']} partly and {counts['assumed']} not (below {100 * INFORMED:g} %; "
-        f'"assumed" in the table): the latter remain about as uncertain as {whose}, even where they moved'
+        f'"assumed" in the table): treat the latter as {expected_of(fit).values}'
     ]
     masses = {fit.estimate.segments[i]: fit.evidence[i, 0] for i in fit.estimated_rows}
     for word, meaning in _EVIDENCE.items():
