@@ -24,6 +24,7 @@ for one in used:
 """
 
 
+@pytest.mark.slow
 def test_what_is_compiled_beforehand_is_what_an_estimate_takes():
     """Of other types than those of the annotations, a function would be compiled twice."""
     done = subprocess.run([sys.executable, "-c", _ESTIMATE], capture_output=True, text=True)

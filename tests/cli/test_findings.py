@@ -175,6 +175,7 @@ def test_where_nothing_is_near_the_families_are_named():
     assert "F, M, L, P, T, S, O, R" in outcome.err
 
 
+@pytest.mark.slow
 def test_every_code_can_be_explained_on_a_narrow_terminal(monkeypatch):
     monkeypatch.setenv("COLUMNS", "30")
     for code in all_rules():

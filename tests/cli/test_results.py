@@ -90,6 +90,7 @@ def test_export_says_what_the_tables_say(fit, results):
     np.testing.assert_allclose(mat["trials"]["coordinates"]["knee_angle_r"], angle, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_workbook_holds_the_strides_side_by_side(fit, results):
     folder = results.parent / "excel"
     outcome = run("export", results, "--xlsx", "-o", folder)

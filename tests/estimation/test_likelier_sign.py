@@ -129,6 +129,7 @@ def test_a_wrong_sign_is_turned(turned, offset):
     assert entry.value == pytest.approx(-offset, abs=0.002)
 
 
+@pytest.mark.slow
 def test_trials_say_it_together(trial, turned):
     alone, together = (
         sign_of(outcome) for outcome in (turned(0.006)[1], signed(person(trial, -1.0, -1.0, offset=0.006))[0])

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from kinertia.estimation.learnt_prior import PersonInformation, person_information
 from kinertia.estimation.prior import literature_prior
@@ -22,6 +23,7 @@ def seen(seed):
     return PersonInformation("", PRIOR, rows.T @ rows, rows.T @ rows @ body)
 
 
+@pytest.mark.slow
 def test_what_is_taken_out_of_an_estimate_does_not_depend_on_its_prior():
     """Nor on the body at which the fit linearised: the same recordings by two priors far apart."""
     person = seen(0)

@@ -118,7 +118,7 @@ def test_a_side_without_an_inner_marker_gets_a_width_and_a_wand(tmp_path):
     assert draft.landmarks["thigh_wand_r"] == ("R.Thigh.Rear",)
 
 
-@pytest.mark.parametrize("hidden", [0, 2])
+@pytest.mark.parametrize("hidden", [pytest.param(0, marks=pytest.mark.slow), 2])
 def test_computed_points_are_in_no_segment_and_listed(tmp_path, hidden):
     """Also where the marker from which bones were computed is hidden in some frames."""
     rng = np.random.default_rng(3)

@@ -58,7 +58,7 @@ def test_an_error_of_contacts_cancels_where_it_does_as_much_in_both_conditions(c
     assert found.sd_by_source["markers"] == pytest.approx(expected, abs=0.001)
 
 
-@pytest.mark.parametrize("own_sd", [0.005, 0.05])
+@pytest.mark.parametrize("own_sd", [0.005, pytest.param(0.05, marks=pytest.mark.slow)])
 def test_no_change_is_rarely_called_one_and_a_true_one_mostly(own_sd):
     """Whether markers or strides vary more."""
     none, some = ([judged(change, (4, 4), 0.3, own_sd, 0.03, seed) for seed in range(1500)] for change in (0.0, 0.2))

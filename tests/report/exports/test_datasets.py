@@ -109,6 +109,7 @@ def test_draws_are_those_of_the_fit(fit):
     )
 
 
+@pytest.mark.slow
 def test_draws_keep_the_covariance_of_the_components_of_joint_moments(fit):
     """Their spread is the standard deviation; components of one draw are those of one model and motion."""
     draws, curves = fit.draws_to_xarray(200), fit.trials[0].joint_curves
@@ -124,6 +125,7 @@ def test_draws_keep_the_covariance_of_the_components_of_joint_moments(fit):
     np.testing.assert_array_equal(draws.joint_moment[0, 1, 0].values, drawn.reshape(spread.shape))
 
 
+@pytest.mark.slow
 def test_arviz_summarises_draws(fit):
     arviz = pytest.importorskip("arviz")
     draws = fit.draws_to_xarray(150)[["bsp"]].sel(parameter="mass")

@@ -10,6 +10,7 @@ from results import entry_of, of_estimate
 from short_walk_fit import estimated, seen
 
 
+@pytest.mark.slow
 def test_forces_of_one_of_two_trials_are_late(trial):
     """The delay is that trial's: neither the other one nor the plates are accused.
 
