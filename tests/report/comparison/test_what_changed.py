@@ -154,7 +154,7 @@ def test_what_keeps_an_outcome_from_being_judged_is_in_its_sentence():
         (sentence,) = change_sentences([replace(known, doubt=doubt)])
         assert named in sentence
         assert "cannot be judged" in sentence
-    single = replace(known, sd=np.nan)
+    single = replace(known, sd=float("nan"))
     for doubt, stated in (("Masses differ: one person? State ages.", False), ("their models differ", True)):
         (sentence,) = change_sentences([replace(single, doubt=doubt)])
         assert (doubt in sentence) is stated, "a note of several sentences is stated by itself"
