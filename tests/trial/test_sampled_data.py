@@ -7,7 +7,7 @@ from scipy import ndimage
 
 from kinertia.errors import TrialError
 from kinertia.trial.data import Markers, PlateLoads, Recording
-from kinertia.trial.sampled_data import all_around, even_mean, gaussian_mean, greatest
+from kinertia.trial.sampled_data import all_around, even_mean, gaussian_mean, greatest, nearest_samples
 from refusals import refused
 
 TIME = np.arange(10) / 100
@@ -92,3 +92,11 @@ def test_even_windows(shape, size):
     assert np.array_equal(greatest(values, size), ndimage.maximum_filter1d(values, size, axis=0))
     inside = ndimage.minimum_filter1d(known, size, axis=0, mode="constant", cval=0)
     assert np.array_equal(all_around(known, size), inside)
+
+
+def test_of_two_samples_equally_near_the_later_one_is_taken_whatever_the_rounding():
+    between = TIME[:-1] + 0.005
+    for rounding_s in (-1e-9, 0.0, 1e-9):
+        np.testing.assert_array_equal(nearest_samples(TIME, between + rounding_s), np.arange(1, 10))
+    np.testing.assert_array_equal(nearest_samples(TIME, between - 1e-4), np.arange(9))
+    np.testing.assert_array_equal(nearest_samples(TIME, np.array([-1.0, 1.0])), [0, 9])

@@ -80,6 +80,12 @@ def test_the_inertia_is_that_of_a_block():
     np.testing.assert_allclose(np.diag(after.prior.mean.inertia_kgm2[-1]), expected)
 
 
+def test_without_a_size_the_inertia_is_that_of_a_ball_of_water():
+    after = with_attached(ready(Attached(mass_kg=4.0, **PACK)))
+    radius_m = (3 * 4e-3 / (4 * np.pi)) ** (1 / 3)  # of 4 litres
+    np.testing.assert_allclose(np.diag(after.prior.mean.inertia_kgm2[-1]), 0.4 * 4.0 * radius_m**2)
+
+
 def test_the_scale_weighs_what_stood_on_it():
     on, beside = (Attached(mass_kg=4.0, **{**PACK, "name": name, "on_scale": name == "on"}) for name in ("on", "off"))
     assert TotalMass.of(70.0, [on, beside]) == TotalMass(66.0, 74.0, pytest.approx(0.04))

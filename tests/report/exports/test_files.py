@@ -242,3 +242,13 @@ def test_folder_that_is_a_file(tmp_path):
 def test_names_of_results_are_known_before(demo_run):
     names = {path.name for path in demo_run[1].iterdir()}
     assert set(FIT_FILES) | set(TRIAL_FILES) <= names
+
+
+def test_standard_deviations_of_coordinates_are_in_degrees_and_metres(demo_run):
+    demo, folder = demo_run
+    curves, skeleton = demo.fit.trials[0].joint_curves, demo.fit.skeleton
+    written = read_sto(folder / "kinematics_sd.sto")
+    sd = curves.deviations.coordinates[curves.known.any(axis=1)]
+    for name, factor in (("pelvis_tx", 1.0), ("hip_flexion_r", 180.0 / np.pi)):
+        expected = factor * sd[:, skeleton.coordinates.index(name)]
+        np.testing.assert_allclose(written[name], expected, rtol=1e-6)

@@ -18,7 +18,8 @@ from kinertia.model.log_cholesky import from_log_cholesky
 from kinertia.model.skeleton import Skeleton
 
 BSP, STILL, PLACES, SKIN = "bsp", "static coordinates", "marker places", "skin"
-"""Names of the model's unknowns."""
+"""Names of the model's unknowns. Those of `BSP` are ten for each segment of the prior, the first of them the logarithm
+of its mass (`model/log_cholesky`)."""
 _SEEN_BY = ("root", "both", "markers")
 
 
