@@ -116,7 +116,17 @@ def test_init_asks_in_a_terminal_for_what_is_not_known(tmp_path, c3d_lab, monkey
     answers = {"Sex, male or female (m, f)": ["x", "m"], "Age, years": ["52"], "Condition of walk2": ["barefoot"]}
     monkeypatch.setattr(drafts, "_in_terminal", lambda: True)
     monkeypatch.setattr(typer, "prompt", lambda question, **_: answers.get(question, [""]).pop(0))
-    assert run("init", folder, "--mass", "72.6", "--height", "1.8").status == 0
+    outcome = run("init", folder, "--mass", "72.6", "--height", "1.8")
+    assert outcome.status == 0
+    assert "Trials: walk1, walk2." in outcome.out
+    assert "now run: kinertia check" in " ".join(outcome.out.split()), "nothing is left to fill in"
     wanted = read_subject(folder / "subject.toml")
     assert (wanted.subject.sex, wanted.subject.age_years, wanted.subject.mass_kg) == ("male", 52.0, 72.6)
     assert {trial.name: trial.condition for trial in wanted.trials} == {"walk1": "", "walk2": "barefoot"}
+
+
+def test_a_stature_in_centimetres_is_asked_again(monkeypatch, capsys):
+    answers = ["168", "1,68"]
+    monkeypatch.setattr(typer, "prompt", lambda question, **_: answers.pop(0))
+    assert drafts._asked({"sex": "male", "age_years": 52.0, "mass_kg": 72.6}) == {"height_m": 1.68}
+    assert "168 is not between 0.5 and 2.5 m" in capsys.readouterr().out

@@ -209,7 +209,7 @@ def sex(text: str) -> str:
     """
     known = sex_of(text)
     if known not in ("male", "female"):
-        raise typer.BadParameter(f"'{text}' is neither male (m) nor female (f): the literature has a table for each")
+        raise typer.BadParameter(f"'{text}' is neither male (m) nor female (f); it selects the body tables")
     return str(known)
 
 

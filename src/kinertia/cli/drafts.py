@@ -12,6 +12,7 @@ import typer
 from kinertia.cli.common import Height, Mass, Outcome, Sex, number, out, plain_table
 from kinertia.cli.common import sex as parsed_sex
 from kinertia.errors import FileError, missing_file
+from kinertia.findings.quantity import Limit
 from kinertia.io.file_names import command_line
 from kinertia.io.marker_set_draft import draft_marker_set, preset_of
 from kinertia.io.marker_set_file import nearest_preset, preset_name, preset_names, read_marker_set
@@ -19,6 +20,7 @@ from kinertia.io.output_folder import write_then_rename
 from kinertia.io.recording import read_recording
 from kinertia.io.subject.body_files import measures_sheet
 from kinertia.io.subject.draft import FILL_IN, MARKER_SET, NO_FORCES, NOT_USED, SUBJECT, init_files
+from kinertia.model.anthropometry import BODY_MASS_KG, STATURE_M
 from kinertia.model.marker_set import fits_person, label_share, spelled_as
 from kinertia.report.figures.measures_picture import measures_picture
 from kinertia.trial.data import Recording
@@ -71,6 +73,7 @@ def init(
     files = init_files(folder, stated=stated, conditions=conditions)
     content = tomllib.loads(files[SUBJECT])
     if _in_terminal():
+        out.print(f"{_found(content)} Press Enter to skip a question.", soft_wrap=True)
         stated |= _asked(content.get("subject", {}))
         conditions |= _asked_conditions(content.get("trial", []), conditions)
         files = init_files(folder, stated=stated, conditions=conditions)
@@ -88,8 +91,9 @@ def init(
             f"no marker-set preset fits: wrote {drafted}, drafted from the marker positions; {check}", soft_wrap=True
         )
     check = command_line(["kinertia", "check", str(path)])
-    out.print(f"wrote {path}: fill in what it asks for, then run: {check}", soft_wrap=True)
-    asked = [line.removeprefix("# ").partition(" =")[0] for line in lines if FILL_IN in line]
+    asked = [line.removeprefix("# ").partition(" =")[0] for line in lines if FILL_IN in line and " =" in line]
+    fill_in = f"fill in {', '.join(dict.fromkeys(asked))}, then run" if asked else "now run"
+    out.print(f"wrote {path}: {fill_in}: {check}", soft_wrap=True)
     marker_set = str(drafted) if MARKER_SET in files else None
     return Outcome({"subject_file": str(path), "marker_set": marker_set, "fill_in": asked, "notes": notes})
 
@@ -99,11 +103,31 @@ def _in_terminal() -> bool:
     return sys.stdin.isatty() and sys.stdout.isatty() and not out.quiet
 
 
+def _found(content: Mapping[str, Any]) -> str:
+    """Name the trials and the static trial of a draft, in a sentence."""
+    names = [Path(trial["markers"]).stem for trial in content.get("trial", [])]
+    listed = ", ".join(names[:_LISTED]) + (f" and {len(names) - _LISTED} more" if len(names) > _LISTED else "")
+    static = content.get("model", {}).get("static")
+    return f"Trials: {listed or 'none'}. Static trial: {Path(static).stem if static else 'none'}."
+
+
+def _from(limits: tuple[Limit, Limit]) -> Callable[[str], float]:
+    """Return a parser of numbers that refuses those beyond these limits, such as a stature in centimetres."""
+
+    def parse(text: str) -> float:
+        value, (least, most) = number(text), limits
+        if not least <= value <= most:
+            raise typer.BadParameter(f"{value:g} is not between {least:g} and {most:g} {least.unit}")
+        return value
+
+    return parse
+
+
 _QUESTIONS: Mapping[str, tuple[str, Callable[[str], object]]] = {
     "sex": ("Sex, male or female (m, f)", parsed_sex),
     "age_years": ("Age, years", number),
-    "mass_kg": ("Body mass, kg", number),
-    "height_m": ("Stature, m", number),
+    "mass_kg": ("Body mass, kg", _from(BODY_MASS_KG)),
+    "height_m": ("Stature, m, such as 1.68", _from(STATURE_M)),
 }
 
 
