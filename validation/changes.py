@@ -235,8 +235,8 @@ All trials of a person are in one estimate. Walks are compared in pairs, strides
 ({pairs} pairs). Nothing changed, so about 5 % should be beyond 95 %. Most pairs are single strides: `compare` says
 *cannot be judged* of them. Here they are judged with the spread that is assumed with fewer than three strides. Walks of
 subject4, Sydney and FMC are among those that this spread comes from, so that they are no independent test of it; the
-spread of runs is not. Dashes: the events need both feet on the ground in turn, which running has not, or no stride
-shows them.
+spread of runs is not, and runs are judged with that of walks. Runs of two strides have a single pair each, which counts
+twice, as halves and as odd and even. Dashes: no stride shows them.
 
 {alarms}
 

@@ -19,9 +19,10 @@ def walks(monkeypatch):
     """Walks of which the speed of each stride is stated."""
     monkeypatch.setattr(change, "_speeds", lambda trial: np.array(trial.speeds, dtype=float))
 
-    def made(*speeds, belt=None):
-        kinematics = SimpleNamespace(trial=SimpleNamespace(belt=belt))
-        return [SimpleNamespace(speeds=speed, kinematics=kinematics) for speed in speeds]
+    monkeypatch.setattr(change, "_on_belt", lambda trial: trial.belt)
+
+    def made(*speeds, belt=False):
+        return [SimpleNamespace(speeds=speed, belt=belt) for speed in speeds]
 
     return made
 
@@ -36,7 +37,7 @@ def test_strides_of_one_walk_are_no_repeats(walks):
 
 
 def test_one_walk_on_a_treadmill_counts_its_strides(walks):
-    found = speed_change(*(walks([v, v + 0.02, v - 0.02], belt="a belt") for v in (1.0, 1.5)))
+    found = speed_change(*(walks([v, v + 0.02, v - 0.02], belt=True) for v in (1.0, 1.5)))
     assert (found.strides, found.verdict) == ((3, 3), "changed")
     assert "Moments change with speed" in speed_sentence(found)
 
@@ -48,7 +49,7 @@ def test_strides_of_one_walk_over_ground_do_not_show_how_walks_differ(walks):
     (row,) = change_rows([found])
     assert row["needed"] == "–"
     assert found.walks_needed(0.1) is None
-    mixed = speed_change(walks([1.0] * 3, belt="a belt"), walks([1.1] * 3))
+    mixed = speed_change(walks([1.0] * 3, belt=True), walks([1.1] * 3))
     assert mixed.verdict == "cannot be judged"
 
 
@@ -70,6 +71,15 @@ def test_a_walk_without_strides_has_the_speed_of_its_pelvis(fit):
     vars(alone := replace(trial))["strides"] = ()
     (speed,) = change._speeds(alone)
     assert speed == pytest.approx(with_strides.mean(), rel=0.05)
+
+
+def test_who_stays_in_place_walks_on_a_treadmill(fit):
+    (trial,) = fit.trials
+    assert not change._on_belt(trial)
+    names = trial.skeleton.coordinates
+    still = trial.trajectory.copy()
+    still[:, [names.index("pelvis_tx"), names.index("pelvis_tz")]] = 0.0
+    assert change._on_belt(replace(trial, trajectory=still))
 
 
 def test_the_gait_profile_score_of_each_side_is_compared(fit):

@@ -12,7 +12,7 @@ from kinertia.errors import KinertiaError
 from kinertia.estimation.changes import condition_changes
 from kinertia.estimation.changes.change import SOURCES
 from kinertia.estimation.changes.condition_changes import changes_of_strides
-from kinertia.estimation.changes.stride_features import EVENTS, Rows, event_bounds
+from kinertia.estimation.changes.stride_features import EVENTS, Rows, event_spans, event_weights
 from kinertia.motion.gait_cycle import Stride
 from kinertia.report.comparison.change_tables import (
     change_columns,
@@ -109,8 +109,20 @@ def test_repeats_needed_show_a_change_and_no_fewer_do():
 
 def test_events_lie_between_contacts():
     stride = Stride("r", 1, 10.0, 11.0, 10.6, 10.1, 10.5, True)
-    assert event_bounds(stride) == pytest.approx((0.0, 10.0, 30.0, 50.0, 60.0, 100.0))
-    assert len(event_bounds(stride)) == len(EVENTS) + 1
+    spans = event_spans(stride)
+    assert np.ravel(spans) == pytest.approx((0.0, 10.0, 10.0, 30.0, 30.0, 50.0, 50.0, 60.0, 60.0, 100.0))
+    assert len(spans) == len(EVENTS)
+
+
+def test_a_run_has_the_halves_of_stance_and_swing():
+    """The other foot left the ground before this one touched it, and comes down after it has left."""
+    run = Stride("r", 1, 10.0, 10.8, 10.32, np.nan, 10.4, True)
+    weights = event_weights(run)
+    assert weights.sum(axis=1) == pytest.approx((0.0, 1.0, 1.0, 0.0, 1.0))
+    assert np.flatnonzero(weights[1])[[0, -1]].tolist() == [0, 20]
+    assert np.flatnonzero(weights[2])[[0, -1]].tolist() == [20, 40]
+    unknown = Stride("r", 1, 10.0, 11.0, 10.6, np.nan, 10.5, True)
+    assert event_weights(unknown).sum(axis=1) == pytest.approx((0.0, 0.0, 0.0, 1.0, 1.0))
 
 
 @pytest.fixture(scope="module")

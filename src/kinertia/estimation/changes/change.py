@@ -236,7 +236,21 @@ def _values(table: dict[str, list[object]], measure: Measure, side: str) -> np.n
 
 
 def _on_belts(before: Sequence[TrialFit], after: Sequence[TrialFit]) -> bool:
-    return all(trial.kinematics.trial.belt is not None for trial in (*before, *after))
+    return all(_on_belt(trial) for trial in (*before, *after))
+
+
+def _on_belt(trial: TrialFit) -> bool:
+    """Decide whether a person walks on a treadmill: its speed is stated, or the pelvis stays in its place."""
+    return trial.kinematics.trial.belt is not None or _pelvis_speed(trial) < _STANDING_M_S
+
+
+def _pelvis_speed(trial: TrialFit) -> float:
+    """Return how fast the pelvis went from the first to the last frame, m/s; NaN if that is not known."""
+    if trial.trajectory is None:
+        return np.nan
+    time = trial.kinematics.trajectory_time
+    first, last = trial.skeleton.root.centre(trial.trajectory[[0, -1]])[:, [0, 2]]
+    return float(np.linalg.norm(last - first) / (time[-1] - time[0]))
 
 
 def _change(measure: Measure, side: str, known: Sequence[Sequence[np.ndarray]], on_belts: bool) -> Change | None:
@@ -279,12 +293,8 @@ def _speeds(trial: TrialFit) -> np.ndarray:
     if strides.size or trial.kinematics.trial.belt is not None or trial.trajectory is None:
         return strides
     time = trial.kinematics.trajectory_time
-    lasted = float(time[-1] - time[0])
-    if lasted < _SHORTEST_S:
-        return strides
-    first, last = trial.skeleton.root.centre(trial.trajectory[[0, -1]])[:, [0, 2]]
-    speed = float(np.linalg.norm(last - first)) / lasted
-    return np.array([speed] if speed > _STANDING_M_S else [])
+    speed = _pelvis_speed(trial)
+    return np.array([speed] if time[-1] - time[0] >= _SHORTEST_S and speed > _STANDING_M_S else [])
 
 
 @dataclass(frozen=True)

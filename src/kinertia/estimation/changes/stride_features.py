@@ -26,7 +26,7 @@ from kinertia.trial.stances import load_edges
 
 EVENTS = ("loading", "mid-stance", "late stance", "push-off", "swing")
 """Phases of a stride: both feet, the other foot in the air (first half, second half), both feet again, this foot in the
-air."""
+air. A run has the second, the third and the last."""
 MOST_CURVES = 20
 """Strides of each trial and side whose curves are compared, evenly spread; features are of all."""
 CONTACT_SD_S = 0.010
@@ -322,17 +322,23 @@ def usual_sources(fit: Fit) -> dict[str, PosteriorDraws]:
 
 def event_weights(stride: Stride) -> np.ndarray:
     """Return the weights (5, 101) that average a curve over each of EVENTS; zero where an event is not known."""
-    bounds = event_bounds(stride)
-    inside = np.array([(first <= PERCENT) & (last >= PERCENT) for first, last in pairwise(bounds)])
+    inside = np.array([(first <= PERCENT) & (last >= PERCENT) for first, last in event_spans(stride)])
     if stride.phase != "stride":
         inside[-1] = False  # it ends with stance
     weights: np.ndarray = inside / np.maximum(inside.sum(axis=1, keepdims=True), 1)
     return weights
 
 
-def event_bounds(stride: Stride) -> tuple[float, ...]:
-    """Return where in the stride (%) each of EVENTS begins, and the last ends; NaN where a contact is not known."""
+def event_spans(stride: Stride) -> tuple[tuple[float, float], ...]:
+    """Return first and last percent of each of EVENTS; NaN where a contact is not known, or the event does not occur.
+
+    Before and after a flight, as of runs, this foot is on the ground alone all the time: there is neither loading nor
+    push-off with both feet.
+    """
     lifts, strikes, off = (
         stride.percent(time_s) for time_s in (stride.opposite_toe_off_s, stride.opposite_strike_s, stride.toe_off_s)
     )
-    return 0.0, lifts, 0.5 * (lifts + strikes), strikes, off, 100.0
+    if strikes > off:
+        never = (np.nan, np.nan)
+        return never, (0.0, 0.5 * off), (0.5 * off, off), never, (off, 100.0)
+    return tuple(pairwise((0.0, lifts, 0.5 * (lifts + strikes), strikes, off, 100.0)))

@@ -64,7 +64,7 @@ def lacking_sentence(found: Sequence[Change]) -> str:
         legs += [f"{SIDES[side][0]} {' and '.join(named)}"] if named else []
     if not legs:
         return ""
-    return f"Not compared, since no step of one condition shows the moment: {'; '.join(legs)}."
+    return f"Not compared, since one condition lacks the event or the moment: {'; '.join(legs)}."
 
 
 def speed_sentence(speed: Change | None) -> str:
