@@ -30,7 +30,7 @@ from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.estimate import estimate_bsp
 from kinertia.workflow.person import Person
 from made_codes import MadeCodes
-from measured_tests import EMPTY, MeasuredTests
+from measured_tests import EMPTY, SAMPLE, MeasuredTests
 from once import once
 from quick_two_level import given_back
 from recordings import NEEDS_MEASURED, SYNTHETIC
@@ -253,7 +253,7 @@ def sample_walk(tmp_path_factory, synthetic_lab):
 
     Yields the folder that the environment variable names, of which it is a folder.
     """
-    measured = find(f"{samples.NAME}/subject01_walk1.trc")
+    measured = find(SAMPLE)
     with pytest.MonkeyPatch.context() as patched:
         if measured is None:
             place = once(tmp_path_factory, "sample", lambda folder: written_sample(synthetic_lab, folder))
@@ -290,7 +290,7 @@ def measured_demo(tmp_path_factory, sample_walk) -> MeasuredDemo:
         assert outcome.status in (0, 1), outcome.err
         return MeasuredDemo(folder, outcome, fits[0])
 
-    kind = "synthetic" if find(samples.NAME) is None else "measured"
+    kind = "synthetic" if find(SAMPLE) is None else "measured"
     return once(tmp_path_factory, f"measured-demo-{kind}", make)
 
 

@@ -14,13 +14,15 @@ from pathlib import Path
 
 import pytest
 
-from kinertia.io.samples import VARIABLE
+from kinertia.io.samples import NAME, VARIABLE
 from recordings import NEEDS_MEASURED, REQUIRED
 from validation.measured_data import find, places
 
 MARK = "measured"
 OF_ANY_WALK = "sample_walk"
 """The fixture that is the measured walk where there is one, and a synthetic one elsewhere."""
+SAMPLE = f"{NAME}/subject01_walk1.trc"
+"""A file of that walk: of a download that failed there is a folder, without files."""
 READ = (".c3d", ".mot", ".osim", ".trc")
 EMPTY = "got empty parameter set"
 """What pytest calls a test on recordings of which none is here."""
@@ -34,7 +36,7 @@ class MeasuredTests:
         sample: whether the sample walk is a measured one.
     """
 
-    def __init__(self, sample: bool = find("gait2354") is not None) -> None:
+    def __init__(self, sample: bool = find(SAMPLE) is not None) -> None:
         self.fixtures = {"measured_folder", *([OF_ANY_WALK] if sample else [])}
         self.everywhere: frozenset[str] | None = None
 
