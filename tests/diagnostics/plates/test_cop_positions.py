@@ -6,8 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from kinertia.diagnostics.plates import cop_positions
 from kinertia.diagnostics.plates.cop_positions import shows_feet_equally
 from kinertia.findings.finding import Severity
+from kinertia.findings.quantity import Where
 from kinertia.trial.data import Markers
 from kinertia.trial.ground_contact import centre_of_pressure
 from kinertia.trial.sampled_data import runs
@@ -143,6 +145,18 @@ def test_how_far_loads_may_lie_along_feet(recording_of):
     assert not excess_m(-0.06 - behind - 0.0255)
     assert excess_m(-0.06 - behind - 0.0265)
     assert not place_findings(moved(recording, (-0.06, 0.0, 0.0)), feet)
+
+
+@pytest.mark.parametrize(
+    ("begin_mm", "push_off_mm", "found"), [(-58, -14, True), (-58, -12, False), (20, 65, False), (22, 65, True)]
+)
+def test_an_offset_moves_both_where_loads_begin_and_where_they_push_off(monkeypatch, begin_mm, push_off_mm, found):
+    """A person of 1.8 m on whose foot either lies so far in front of where it is on other people."""
+    monkeypatch.setattr(cop_positions, "_bears_elsewhere", lambda step, context: False)
+    ahead_m = 1.8 * np.array([0.033, 0.107]) + 1e-3 * np.array([begin_mm, push_off_mm])
+    step = SimpleNamespace(is_step=True, ahead_m=lambda shares: ahead_m)
+    context = SimpleNamespace(height_m=1.8, whole_contacts=[step], at=lambda: Where())
+    assert bool(list(cop_positions._along_feet(context, [step]))) is found
 
 
 def direction(recording):
