@@ -240,6 +240,11 @@ def test_markers_that_are_not_seen_misplace_nothing(walked):
     seen = np.tile(~hidden, (len(q), 1))
     without = placement(skeleton, q, seen, np.where(hidden, 0.0, sd), {})
     np.testing.assert_array_equal(placement(skeleton, q, seen, sd, {}), without)
+    # nor are there any in a frame that no camera saw
+    seen[1] = False
+    unseen = placement(skeleton, q, seen, sd, {})
+    np.testing.assert_array_equal(unseen[1], 0.0)
+    np.testing.assert_array_equal(np.delete(unseen, 1, axis=0), np.delete(without, 1, axis=0))
 
 
 FRAMES_ALIKE, SD_M, SPACING_S = 9.0, 0.004, 0.05

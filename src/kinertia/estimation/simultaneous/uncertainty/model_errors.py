@@ -97,10 +97,14 @@ def placement(
 
 
 def _following(by: np.ndarray) -> np.ndarray:
-    """Return the changes (d, c, r) of coordinates that follow r marker coordinates, from the derivatives (d, r, c)."""
+    """Return the changes (d, c, r) of coordinates that follow r marker coordinates, from the derivatives (d, r, c).
+
+    Coordinates that no marker shows in a frame follow nothing.
+    """
     transposed, every = by.transpose(0, 2, 1), np.arange(by.shape[2])
     normal = transposed @ by
-    normal[:, every, every] += _SHOWN * normal[:, every, every].max(axis=1, keepdims=True)
+    largest = normal[:, every, every].max(axis=1, keepdims=True)
+    normal[:, every, every] += _SHOWN * np.where(largest > 0.0, largest, 1.0)
     result: np.ndarray = np.linalg.solve(normal, transposed)
     return result
 
