@@ -19,7 +19,7 @@ from validation.walks import WALKS
 
 _PAGE = """# Accuracy of the simultaneous estimate
 
-What synthetic people say, of whom the truth is known, in fourteen laboratories of different errors. The tables follow.
+Results for synthetic people, whose true values are known, in fourteen laboratories with different errors.
 
 **[Joint moments](#joint-moments)** are better than the usual pipeline's at every joint in every laboratory, but for
 ankles where axes are 5 degrees off (3 % worse). At legs and back, errors are 0.1 to 0.5 times the usual ones where
@@ -43,7 +43,7 @@ to a person's mass, is already nearly as good, and chance decides for many: the 
 
 **Long walks and several**: skin motion is the same in every stride, and does not average out. What comes back counts
 once, at whatever pace, so that bars hold after twelve strides, too, and errors are hardly smaller than after two. Other
-motions tell more.
+motions are more informative.
 
 On trials made by OpenSim, with OpenSim's own tools as the usual pipeline: [peers](peers.md).
 

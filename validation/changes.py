@@ -234,9 +234,9 @@ synthetic people whose change is known exactly.
 All trials of a person are in one estimate. Walks are compared in pairs, strides of a run in halves and odd with even
 ({pairs} pairs). Nothing changed, so about 5 % should be beyond 95 %. Most pairs are single strides: `compare` says
 *cannot be judged* of them. Here they are judged with the spread that is assumed with fewer than three strides. Walks of
-subject4, Sydney and FMC are among those that this spread comes from, so that they are no independent test of it; the
-spread of runs is not, and runs are judged with that of walks. Runs of two strides have a single pair each, which counts
-twice, as halves and as odd and even. Dashes: no stride shows them.
+subject4, Sydney and FMC are among those that this spread comes from, so that they are no independent test of it. It was
+not measured in runs, which are judged with the spread of walks. A run of two strides has a single pair, which counts
+twice: as two halves, and as odd and even strides. Dashes: not observed in any stride.
 
 {alarms}
 
@@ -253,8 +253,8 @@ change the moments of the trunk.
 
 {unaffected}
 
-The four ankle moments of trunk sway differ from those of the normal walks by 5 to 18 standard deviations due to
-instruments, body and markers: these steps did differ. Nearly all of the deviation is the spread of strides, and one
+In the walk with trunk sway, the four ankle moments differ from those of the normal walks by 5 to 18 SDs of instruments,
+body and markers together: these steps did differ. Nearly all of the deviation is the spread of strides, and one
 walk does not show whether its instruction made the difference. It is 5 % slower (1.21 against 1.28 m/s), which
 `compare` says first.
 

@@ -14,7 +14,6 @@ lengthened (`_FIXED_AXES`).
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Protocol
 
 import numpy as np
 
@@ -57,8 +56,8 @@ NARROW_M = 0.006
 """Largest SD of a marker's position in a fit of one session alone, with a prior of 5 mm; as one of two it has 10 mm."""
 _VIRTUAL = frozenset(marker.label for marker in VIRTUAL_TRUNK)
 _LIGHTER, _LONGER = 0.1, 0.05
-"""Relative differences of mass, and of legs, beyond which it is asked whether results are of one person. Markers put on
-anew change legs by 2 %."""
+"""Relative differences of mass, and of leg length, beyond which it is asked whether results are of one person.
+Re-applied markers change the length of legs by 2 %."""
 _GROWN_YEARS = 20.0
 _OTHER_PERSON = 1.5
 """Ratio of masses beyond which results are hardly of one person: a child takes years to gain as much."""
@@ -132,7 +131,7 @@ def why_incomparable(before: Fit, after: Fit) -> str:
     both = _recordings(before), _recordings(after)
     if same := sorted(both[0][content] for content in both[0].keys() & both[1].keys()):
         return f"{', '.join(same)}: both are from the same recording, so nothing can have changed between them"
-    if reason := other_sex(before, after):
+    if reason := other_sex(before.subject, after.subject):
         return reason
     ratio = after.mass_kg / before.mass_kg
     if not 1.0 / _OTHER_PERSON < ratio < _OTHER_PERSON:
@@ -140,15 +139,9 @@ def why_incomparable(before: Fit, after: Fit) -> str:
     return ""
 
 
-class _OfPerson(Protocol):
-    @property
-    def subject(self) -> Subject:
-        """Who it is."""
-
-
-def other_sex(before: _OfPerson, after: _OfPerson) -> str:
-    """State that two results, or subject files, are of people of different sex; empty if not, or if it is not known."""
-    sexes = before.subject.sex, after.subject.sex
+def other_sex(before: Subject, after: Subject) -> str:
+    """State that two subjects are of different sex; empty if not, or if it is not known."""
+    sexes = before.sex, after.sex
     if None in sexes or len(set(sexes)) == 1:
         return ""
     return f"{sexes[0]} and {sexes[1]} are not the sex of one person: correct it in one of both"
@@ -342,7 +335,7 @@ def instrument_doubts(before: tuple[Fit, Trials], after: tuple[Fit, Trials]) -> 
 
 
 def _sides(finding: Finding) -> tuple[str, ...]:
-    """Return the sides whose loads a finding is about: that of a foot which it names, or all."""
+    """Return the sides whose loads a finding concerns: that of the foot in its evidence; all sides if it has none."""
     foot = finding.evidence.get("foot")
     return {"right": ("r",), "left": ("l",)}.get("" if foot is None else str(foot.value), ("r", "l", ""))
 

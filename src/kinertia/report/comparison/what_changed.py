@@ -242,7 +242,8 @@ def opened(sources: Sequence[Source], conditions: tuple[str, str] | None) -> lis
     if len(found) <= 2:
         for source, wanted in zip(found * 2 if len(found) == 1 else found, conditions or (None, None), strict=False):
             condition_among(_stated(source), source.subject.name, wanted)
-    if len(found) == 2 and not all(isinstance(source, Fit) for source in found) and (why := other_sex(*found)):
+    files = any(isinstance(source, SubjectFile) for source in found)
+    if len(found) == 2 and files and (why := other_sex(*(source.subject for source in found))):
         raise KinertiaError(why)
     hashes = [
         {sha256(trial.markers): trial.markers for trial in source.trials} if isinstance(source, SubjectFile) else {}
