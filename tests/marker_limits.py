@@ -58,6 +58,14 @@ def jumped(size_m):
     return displaced_for(9.0, size_m)
 
 
+def after_a_gap(size_m):
+    def hide(places, time):
+        places[70:80, 1] = np.nan
+        places[80, 1, 2] += size_m
+
+    return trajectories(moving(hide))
+
+
 def frozen(seconds):
     def freeze(places, time):
         places[500 : 500 + round(1000 * seconds), 1] = places[500, 1]
@@ -149,6 +157,7 @@ MARKER_LIMITS = {
     "M114 straight": (nearly_straight, 0.00017, 0.00013, [], ["WARNING"]),
     "M115 coinciding": (beside, 0.0031, 0.0029, [], ["WARNING"]),
     "M115 coinciding_for": (lambda s: beside(0.001, s), 0.099, 0.102, [], ["WARNING"]),
+    "M116 step": (after_a_gap, 0.0385, 0.0415, [], ["CORRECTED"]),
     "M121 step": (cut, 0.0058, 0.0062, [], ["ERROR"]),
     "M122 few": (copied, 9, 10, ["WARNING"], ["ERROR"], lambda share: 199 * share),
     "M122 copied": (copied, 50, 49, [], ["ERROR"], lambda share: 199 * share),

@@ -142,7 +142,7 @@ def test_every_limit_that_is_declared_is_in_a_text():
 
 
 NUMBERS = (
-    "F106 F115 F181 M111 M112 M175 P107 P215 P223 P231 P234 P236 P237 "
+    "F106 F115 F181 M111 M112 M116 M175 P107 P215 P223 P231 P234 P236 P237 "
     "P242 P246 P267 P282 R107 R305 S111 S113 S306 T214 T215"
 )
 """Codes whose texts have numerals: numbers of SDs, of frequencies and of rotations, and what formats and tables say."""

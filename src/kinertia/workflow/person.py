@@ -11,7 +11,7 @@ from typing import Literal, Self, TypeVar
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.trajectory_faults import without_copied_frames
+from kinertia.diagnostics.evidence.trajectory_faults import without_copied_frames, without_frames_beside_gaps
 from kinertia.diagnostics.model.model_on_person import range_findings
 from kinertia.diagnostics.subject.movements import task_of
 from kinertia.errors import BlockedError, KinertiaError, MarkerSetError, SettingsError, SubjectError, TrialError
@@ -197,8 +197,8 @@ class RotatedTrial:
 
 
 def usable_trial(context: RecordingContext) -> Trial:
-    """Return the usable trial of a recording: without markers that no frame shows, without copied frames, and without
-    forces where only its markers are used.
+    """Return the usable trial of a recording: without markers that no frame shows, without frames that are copied or
+    mislabelled, and without forces where only its markers are used.
 
     Frames in which a foot bears load beyond its plate are not measured, unless the user vouches for a window, or
     hardly any others are left.
@@ -211,7 +211,7 @@ def usable_trial(context: RecordingContext) -> Trial:
     seen = trial.markers.seen
     labels = [label for column, label in enumerate(trial.markers.labels) if seen[:, column].any()]
     usable = context.trial_on_plates or trial
-    markers = without_copied_frames(trial.markers.select(labels))
+    markers = without_frames_beside_gaps(without_copied_frames(trial.markers.select(labels)))
     return replace(usable, markers=markers, task=task_of(context), condition=context.condition)
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from kinertia.diagnostics.evidence.trajectory_faults import without_frames_beside_gaps
 from kinertia.diagnostics.markers.swapped_markers import label_swaps
 from kinertia.diagnostics.markers.trajectories import trajectories
 from kinertia.diagnostics.markers.unmeasured_data import frames
@@ -183,3 +184,19 @@ def test_two_labels_of_one_marker(frames, severity):
 
 def test_a_single_frame_is_no_while():
     assert found(trajectories, walking(1)) == []
+
+
+@pytest.mark.parametrize("frame", [30, 69])
+def test_frames_beside_a_gap_in_which_another_marker_has_the_label_are_left_out(frame):
+    def mislabel(places, time):
+        places[[*range(20, 30), *range(70, 80)], 1] = np.nan
+        places[frame, 1] = places[frame, 0]
+
+    markers = changed(walking(), mislabel)
+    (finding,) = found(trajectories, markers)
+    assert (finding.code, finding.where.markers, finding.evidence["frames"].value) == ("M116", ("B",), 1.0)
+    assert finding.evidence["first_s"].value == pytest.approx(frame / 100)
+    mended = without_frames_beside_gaps(markers)
+    assert np.isnan(mended.positions[frame, 1]).all()
+    assert np.isfinite(mended.positions[30:70, 1]).all(axis=1).sum() == 39
+    assert without_frames_beside_gaps(mended) is mended

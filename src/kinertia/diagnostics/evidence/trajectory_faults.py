@@ -91,7 +91,7 @@ class TrajectoryFaults:
 
     @classmethod
     def of(cls, markers: Markers, segments: Mapping[str, Sequence[str]], coarse: bool = False) -> Self:
-        """Find the faults of all markers.
+        """Find the faults of all markers, besides frames that are left out (`beside_gaps`).
 
         Args:
             markers: of a motion, or of a person who stands.
@@ -101,6 +101,7 @@ class TrajectoryFaults:
         """
         if len(markers.time) < 3:
             return cls()
+        markers = without_frames_beside_gaps(markers)
         off = _off_neighbours(markers.positions)
         far = _local_peaks(off) & (off > spike_limit_m(markers.rate_hz))
         if coarse or len(markers.time) < 5:
@@ -326,6 +327,23 @@ def without_copied_frames(markers: Markers) -> Markers:
     if not copies.fill_lost_frames:
         return markers
     return replace(markers, positions=np.where(copies.copied[:, None, None], np.nan, markers.positions))
+
+
+def beside_gaps(markers: Markers) -> BoolArray:
+    """Find frames (n, m) just before or after a gap of a marker, from which it jumps to where it then goes on."""
+    position, limit_m = markers.positions, step_limit_m(markers.rate_hz)
+    found = np.zeros(position.shape[:2], dtype=bool)
+    for order in (slice(None), slice(None, None, -1)):
+        seen, way = markers.seen[order], np.diff(position[order], axis=0)
+        turned = np.linalg.norm(np.diff(way, axis=0), axis=-1)
+        found[order][1:-3] |= ~seen[:-4] & (turned[1:-1] > limit_m) & (turned[2:] < limit_m / 2)
+    return found
+
+
+def without_frames_beside_gaps(markers: Markers) -> Markers:
+    """Return the markers with gaps extended by frames in which another marker has the label (`beside_gaps`)."""
+    off = beside_gaps(markers)
+    return replace(markers, positions=np.where(off[..., None], np.nan, markers.positions)) if off.any() else markers
 
 
 def brief_runs(mask: BoolArray, rate_hz: float) -> BoolArray:

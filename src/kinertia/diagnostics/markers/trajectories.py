@@ -22,6 +22,7 @@ from kinertia.diagnostics.evidence.trajectory_faults import (
     STEP_M,
     STRAIGHT_M,
     STRAIGHT_S,
+    beside_gaps,
     spike_limit_m,
     step_limit_m,
 )
@@ -56,6 +57,7 @@ _MOSTLY_SEEN = 0.9
     "M113",
     "M114",
     "M115",
+    "M116",
     unless=NEEDS_LENGTH_UNIT + NEEDS_MEASURED_FRAMES,
     spike=SPIKE_M,
     brief=BRIEF_S,
@@ -67,10 +69,11 @@ _MOSTLY_SEEN = 0.9
     coinciding_for=_COINCIDING_S,
 )
 def trajectories(context: RecordingContext) -> Iterator[Finding]:
-    """Report M111 to M115: faults of single trajectories, one finding per marker with spikes, per jump and per filled
-    gap; and labels of one and the same marker.
+    """Report M111 to M116: faults of single trajectories, one finding per marker with spikes, per jump and per filled
+    gap; labels of one and the same marker; and frames beside gaps that are left out.
     """
     yield from _coinciding(context)
+    yield from _beside_gaps(context)
     faults, rate_hz = context.trajectory_faults, context.markers.rate_hz
     for spikes in faults.spikes:
         yield finding(
@@ -95,6 +98,17 @@ def trajectories(context: RecordingContext) -> Iterator[Finding]:
             span_s=Quantity(filled.span_s[1] - filled.span_s[0], "s"),
             relative_motion_m=Quantity(filled.relative_motion_m, "m", limit=OFF_M),
         )
+
+
+def _beside_gaps(context: RecordingContext) -> Iterator[Finding]:
+    """Report M116: labels of the marker set that another marker has in a frame beside a gap."""
+    off = beside_gaps(context.markers)
+    for k in np.flatnonzero(off.any(axis=0)):
+        label, time = context.markers.labels[k], context.markers.time[off[:, k]]
+        if label in context.segment_of_label:
+            where = context.at(markers=(label,), span_s=(float(time[0]), float(time[-1])))
+            first_s = Quantity(float(time[0]), "s")
+            yield finding("M116", where, frames=Quantity(float(len(time)), "1"), first_s=first_s)
 
 
 def _coinciding(context: RecordingContext) -> Iterator[Finding]:
