@@ -92,7 +92,7 @@ def test_centre_of_mass_far_from_the_literature_where_there_is_no_prior():
     moved = replace(BODY, com_m=BODY.com_m + np.array([[0.0], [0.12]]) * [0, 1, 0])
     (finding,) = found(estimate=moved)
     assert levels([finding]) == [("R203", "ERROR")]
-    assert finding.where.part == "centre of mass of thigh_r"
+    assert finding.where.part == "centre of mass of the right thigh"
     assert finding.evidence["distance_m"].value == pytest.approx(0.12)
     assert found(estimate=replace(BODY, com_m=BODY.com_m + np.array([[0.0], [0.09]]) * [0, 1, 0])) == []
 
@@ -103,7 +103,7 @@ def test_parameters_by_prior_deviations(away, expected):
     answers = found({"prior_sd": np.full((2, 10), 0.01)}, estimate=estimate)
     assert levels(answers) == ([] if expected is None else [("R203", expected)] * 2)
     parts = [finding.where.part for finding in answers]
-    assert parts == ([] if expected is None else ["mass of pelvis", "centre of mass along x of thigh_r"])
+    assert parts == ([] if expected is None else ["mass of the pelvis", "fore-aft centre of mass of the right thigh"])
     assert all(finding.evidence["distance_sd"].value == pytest.approx(away) for finding in answers)
 
 

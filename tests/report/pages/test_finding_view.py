@@ -124,6 +124,10 @@ def test_every_code_on_the_page_is_explained_there():
     ]  # fmt: skip
 
 
+def test_explanations_have_limits_in_place_of_their_names():
+    assert not [rule_.code for rule_ in view(*UNUSABLE).rules if "{" in rule_.detects + rule_.escalation]
+
+
 @pytest.mark.parametrize(
     ("quantity", "text"),
     [

@@ -33,6 +33,14 @@ CONTRADICTING_COM_M = Limit(0.1, "m")
 _ONE_SIDED_SD = Limit(4.0)
 """As in `one_sided`."""
 _ARMS = ("upper_arm", "forearm", "hand")
+_SIDES = {"r": "right", "l": "left"}
+_PARAMETER_WORDS = {
+    "mass": "mass",
+    "com": "centre of mass",
+    "com_x": "fore-aft centre of mass",
+    "com_y": "longitudinal centre of mass",
+    "com_z": "mediolateral centre of mass",
+}
 _WRONG = "a misplaced marker or joint centre, or an error of a plate"
 _WORN = "something worn or carried that was not declared ([[attached]])"
 _OTHER = "a body that the tables do not describe (age_years, population under [subject])"
@@ -106,10 +114,10 @@ def _far_parameters(fit: Fit) -> Iterator[Finding]:
 
 
 def _parameter(fit: Fit, row: int, parameter: str) -> Where:
-    kind, _, axis = parameter.partition("_")
-    words = {"mass": "mass", "com": "centre of mass"}.get(kind, f"moment of inertia {parameter}")
-    along = f" along {axis}" if axis else ""
-    return Where(part=f"{words}{along} of {fit.estimate.segments[row]}")
+    words = _PARAMETER_WORDS.get(parameter, f"moment of inertia {parameter}")
+    name, _, side = fit.estimate.segments[row].rpartition("_")
+    segment = f"{_SIDES[side]} {name}" if name and side in _SIDES else fit.estimate.segments[row]
+    return Where(part=f"{words} of the {segment.replace('_', ' ')}")
 
 
 def _far_centres(fit: Fit) -> Iterator[Finding]:

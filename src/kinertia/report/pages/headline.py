@@ -81,7 +81,9 @@ def purposes(outputs: Sequence[Suitability], no_body: bool) -> tuple[Purpose, ..
     segments = [by_name[name] for name in ("segment masses", "centres of mass", "moments of inertia")]
     uses = {rating.use for rating in segments}
     by_use = [
-        f"{use}: {', '.join(rating.output for rating in segments if rating.use == use)}" for use in USES if use in uses
+        f"{word}: {', '.join(rating.output for rating in segments if rating.use == use)}"
+        for use, word in zip(USES, ("use", "with care", DO_NOT_USE), strict=True)
+        if use in uses
     ]
     codes = dict.fromkeys(code for rating in segments for code in rating.codes)
     by_use += [f"see {', '.join(codes)}"] if codes else []

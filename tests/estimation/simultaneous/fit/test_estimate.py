@@ -101,7 +101,7 @@ def test_a_model_that_is_contradicted_is_called_so(trial):
     wrong = replace(literature, com_m=com)
     found = of_estimate(fitted(trial, wrong), literature=wrong)
     far = {finding.where.part: finding.evidence["distance_sd"].value for finding in found if finding.code == "R203"}
-    assert far["centre of mass along x of torso"] < -3.0
+    assert far["fore-aft centre of mass of the torso"] < -3.0
 
 
 def test_an_unfinished_estimate_is_called_so(trial, monkeypatch):
