@@ -112,7 +112,9 @@ def _write_tables(folder: Path, found: Comparison) -> None:
 
 
 def _print_changes(found: Comparison) -> None:
-    out.print(f"{found.before} -> {found.after}; internal moments over body mass", soft_wrap=True)
+    out.print(
+        f"{found.before} -> {found.after}; moments over body mass, internal unless called external", soft_wrap=True
+    )
     for sentence in found.sentences:
         out.print(sentence, soft_wrap=True)
 

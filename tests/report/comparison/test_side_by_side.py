@@ -98,7 +98,7 @@ def test_two_persons_and_two_models_are_pointed_out(fit, fit_with_model):
         trace["name"]: trace["y"]
         for trace in panel_of(moments_figure({"b": on_model}), "Right knee moment, extension +")
     }
-    np.testing.assert_allclose(moments["b"], -np.asarray(theirs["b"]), rtol=1e-5)
+    np.testing.assert_allclose(moments["b"], theirs["b"], rtol=1e-5)
 
 
 def panel_of(figure, title):
@@ -143,11 +143,11 @@ def test_signs_of_a_coordinate_are_told_by_what_it_turns(fit, turned_deg, sign):
 
 def test_moments_are_those_of_cycles(fit):
     figure = moments_figure({"a": fit, "b": fit})
-    traces = panel_of(figure, "Right knee moment, flexion + (N m/kg)")
+    traces = panel_of(figure, "Right knee moment, extension + (N m/kg)")
     assert [trace["name"] for trace in traces] == ["a", "b"]
     cycles = fit.cycles()
     knee = cycles[(cycles.quantity == "knee_angle_moment") & (cycles.side == "r")]
-    np.testing.assert_allclose(traces[0]["y"], knee.groupby("percent").value.mean(), rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(traces[0]["y"], -knee.groupby("percent").value.mean(), rtol=1e-5, atol=1e-6)
 
 
 @pytest.mark.slow

@@ -14,8 +14,15 @@ from kinertia.estimation.changes.session_changes import one_session_note, tasks_
 from kinertia.estimation.result.fit import Fit
 from kinertia.io.subject.tables import SubjectFile
 from kinertia.report.comparison import what_changed
-from kinertia.report.comparison.change_tables import change_columns, change_sentences, changes_summary, lacking_sentence
+from kinertia.report.comparison.change_tables import (
+    change_columns,
+    change_sentences,
+    changes_summary,
+    lacking_sentence,
+    shown_changes,
+)
 from kinertia.report.comparison.what_changed import opened
+from kinertia.report.figures.coordinate_titles import outcome_signs
 
 
 @pytest.fixture
@@ -143,6 +150,31 @@ def test_a_leg_whose_moments_are_not_known_is_named():
     assert "right" not in lacking_sentence(right)
     some = [*right, changed("l", PRIMARY[0])]
     assert "mid-stance" not in lacking_sentence(some)
+
+
+@pytest.mark.parametrize(
+    ("convention", "knee", "ankle", "tilt"),
+    [
+        (
+            "clinical",
+            ("external knee adduction", -1.0),
+            ("ankle plantarflexion", -1.0),
+            ("pelvic tilt, anterior", -1.0),
+        ),
+        ("isb", ("knee adduction", 1.0), ("ankle dorsiflexion", 1.0), ("pelvic tilt, posterior", 1.0)),
+        ("opensim", ("knee adduction", 1.0), ("ankle dorsiflexion", 1.0), ("pelvis tilt, backward", 1.0)),
+    ],
+)
+def test_sentences_and_pages_have_the_signs_of_the_convention(fit, convention, knee, ankle, tilt):
+    signs = outcome_signs(replace(fit, settings=fit.settings.model_copy(update={"convention": convention})))
+    assert signs["moment", "knee", "adduction", "l"] == knee
+    assert signs["moment", "ankle", "flexion", "r"] == ankle
+    assert signs["angle", "pelvis", "tilt", "r"] == tilt
+    as_stored = changed("r", PRIMARY[2])
+    (shown,) = shown_changes([as_stored], signs)
+    assert (shown.before, shown.difference) == (ankle[1] * as_stored.before, ankle[1] * as_stored.difference)
+    assert (shown.verdict, shown.primary) == (as_stored.verdict, True)
+    assert f"{ankle[0]} moment" in next(change_sentences([shown])).lower()
 
 
 def test_what_keeps_an_outcome_from_being_judged_is_in_its_sentence():

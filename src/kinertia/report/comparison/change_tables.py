@@ -2,13 +2,14 @@
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 import numpy as np
 
 from kinertia.estimation.changes.change import MOST_WALKS, NOTABLE, PRIMARY, SOURCES, Change, GroupChange, Names
 from kinertia.estimation.changes.curve_changes import CurveChange
+from kinertia.report.figures.coordinate_titles import OutcomeSigns
 from kinertia.report.figures.cycle_figures import band, mean_line
 from kinertia.report.figures.figure import (
     COMPARED,
@@ -42,12 +43,42 @@ _MOST_NAMED = 4
 _PHASES = {"stride": "% of the gait cycle", "stance": "% of stance"}
 
 
+@dataclass(frozen=True)
+class _ShownChange(Change):
+    """A change with the sign, and the positive direction in words, that sentences and pages have."""
+
+    words: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class _ShownCurve(CurveChange):
+    """A change of a curve with the sign, and the positive direction in words, that pages have."""
+
+    words: str = ""
+
+
+def shown_changes(found: Sequence[Change], signs: OutcomeSigns) -> list[Change]:
+    """Return changes with the signs of sentences and pages."""
+    return [_ShownChange(**_signed(change, signs)) for change in found]
+
+
+def shown_curves(found: Sequence[CurveChange], signs: OutcomeSigns) -> list[CurveChange]:
+    """Return curves with the signs of pages."""
+    return [_ShownCurve(**_signed(curve, signs)) for curve in found]
+
+
+def _signed(outcome: Change | CurveChange, signs: OutcomeSigns) -> dict[str, Any]:
+    words, sign = signs.get((outcome.quantity, outcome.joint, outcome.component, outcome.side), ("", 1.0))
+    return {**vars(outcome), "before": sign * outcome.before, "after": sign * outcome.after, "words": words}
+
+
 def change_sentences(found: Sequence[Change]) -> Iterator[str]:
     """Yield a sentence for each outcome that was named beforehand, as a report may state it."""
     for wanted in PRIMARY:
         for change in found:
             if (change.quantity, change.joint, change.component, change.event) == wanted:
-                internal = "internal, " if change.quantity == "moment" else ""
+                external = outcome_words(change).startswith("external ")
+                internal = "internal, " if change.quantity == "moment" and not external else ""
                 yield f"{_with_side(change)} ({internal}{change.event}) {_judgement(change)}."
 
 
@@ -247,6 +278,9 @@ def _group_row(change: GroupChange) -> tuple[str, ...]:
 def outcome_words(outcome: Change | CurveChange | GroupChange) -> str:
     """Return what a change is of: "knee adduction moment", "walking speed"."""
     quantity = "" if outcome.quantity == "gait" else f" {outcome.quantity}"
+    if words := getattr(outcome, "words", ""):
+        name, comma, direction = words.partition(", ")
+        return f"{name}{quantity}{comma}{direction}"
     return f"{outcome.joint} {outcome.component}{quantity}".replace("_", " ")
 
 
@@ -293,18 +327,21 @@ def curve_figures(curves: Sequence[CurveChange], before: str, after: str) -> lis
             chosen = [curve for curve in curves if (curve.quantity, curve.joint) == (quantity, joint)]
             if chosen:
                 title = f"{joint.capitalize()} {quantity}s"
-                drawn = joint_figure(chosen, title, before, after)
-                result.append({"id": f"change-{joint}-{quantity}", "title": title, "figure": written(drawn)})
+                drawn = written(joint_figure(chosen, title, before, after))
+                changed = any(curve.changed.any() for curve in chosen)
+                id_ = f"change-{joint}-{quantity}"
+                result.append({"id": id_, "title": title, "figure": drawn, "changed": changed})
     return result
 
 
 def joint_figure(curves: Sequence[CurveChange], title: str, before: str, after: str) -> Figure:
     """Draw the curves of one joint, side by side, and their differences below."""
     panels: list[Panel] = []
+    mixed = len({curve.phase for curve in curves}) > 1
     for side in ("r", "l", ""):
         of_side = [curve for curve in curves if curve.side == side]
-        panels += [_both(curve, before, after) for curve in of_side]
-        panels += [_difference(curve) for curve in of_side]
+        panels += [_both(curve, before, after, mixed) for curve in of_side]
+        panels += [_difference(curve, mixed) for curve in of_side]
     axis: dict[str, Any] = {"range": [0, 100], "tickvals": [0, 20, 40, 60, 80, 100]}
     axis["title"] = {
         "text": " or ".join(dict.fromkeys(_PHASES[curve.phase] for curve in curves)),
@@ -315,7 +352,7 @@ def joint_figure(curves: Sequence[CurveChange], title: str, before: str, after: 
     return small_multiples(panels, alt, axis)
 
 
-def _both(curve: CurveChange, before: str, after: str) -> Panel:
+def _both(curve: CurveChange, before: str, after: str, mixed: bool) -> Panel:
     traces: list[dict[str, Any]] = []
     for name, mean, sd, colour in (
         (before, curve.before, curve.before_sd, COMPARED[0]),
@@ -323,16 +360,16 @@ def _both(curve: CurveChange, before: str, after: str) -> Panel:
     ):
         traces.append(band(mean - INTERVAL_SD * sd, mean + INTERVAL_SD * sd, faded(colour, _OPACITY)))
         traces.append({**mean_line(mean), "name": plain(name), "line": {"color": colour, "width": 2}})
-    return Panel(f"{_words(curve)} ({curve.unit})", traces)
+    return Panel(f"{_words(curve, mixed)} ({curve.unit})", traces)
 
 
-def _difference(curve: CurveChange) -> Panel:
+def _difference(curve: CurveChange, mixed: bool) -> Panel:
     low, high = curve.band
     traces: list[dict[str, Any]] = []
     if np.isfinite(curve.factor):
         traces.append(band(low, high, faded(GREY, _OPACITY)))
     traces.append({**mean_line(curve.difference), "name": "difference", "line": {"color": GREY, "width": 2}})
-    return Panel(f"Difference: {_words(curve)}", traces, shapes=list(_shown(curve)))
+    return Panel(f"Difference: {_words(curve, mixed)}", traces, shapes=list(_shown(curve)))
 
 
 def _shown(curve: CurveChange) -> Iterator[dict[str, Any]]:
@@ -341,8 +378,10 @@ def _shown(curve: CurveChange) -> Iterator[dict[str, Any]]:
         yield shaded(float(first), float(last), faded(GREEN, _SHADE))
 
 
-def _words(curve: CurveChange) -> str:
+def _words(curve: CurveChange, mixed: bool) -> str:
     side = f"{SIDES[curve.side][0]} " if curve.side else ""
-    during = ", stance" if curve.phase == "stance" else ""
-    text = f"{side}{curve.joint} {curve.component}{during}".replace("_", " ")
+    during = ", stance" if mixed and curve.phase == "stance" else ""
+    words = getattr(curve, "words", "").replace("external rotation", "ext. rotation")
+    words = words.replace("internal rotation", "int. rotation")
+    text = f"{side}{f'{words} +' if words else f'{curve.joint} {curve.component}'}{during}".replace("_", " ")
     return text[0].upper() + text[1:]

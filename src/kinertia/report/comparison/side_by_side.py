@@ -14,7 +14,13 @@ from kinertia.estimation.result.cycles import UNITS as UNITS_OF_CURVES
 from kinertia.estimation.result.fit import Fit
 from kinertia.model.bsp import PARAMETERS, UNITS
 from kinertia.report.figures.bsp_figures import NAMES, segment_name
-from kinertia.report.figures.coordinate_titles import load_title, panels_of, same_segment, same_sign
+from kinertia.report.figures.coordinate_titles import (
+    convention_of,
+    panels_of,
+    same_segment,
+    same_sign,
+    signed_load_title,
+)
 from kinertia.report.figures.cycle_figures import estimated_curves, mean_curve, mean_line
 from kinertia.report.figures.figure import COMPARED, SIDES, Figure, Panel, plain, small_multiples, written
 from kinertia.report.figures.time_figures import MOST_FRAMES
@@ -263,24 +269,28 @@ def _row(difference: Difference) -> dict[str, Any]:
 
 
 def moments_figure(fits: Mapping[str, Fit]) -> Figure | None:
-    """Draw mean joint moments of the legs over the gait cycle, a colour per result, with the signs of the first; None
-    where none has strides.
+    """Draw mean joint moments of the legs over the gait cycle, a colour per result, with the first one's convention of
+    signs; None where none has strides.
     """
     walked = {name: fit for name, fit in fits.items() if _strides(fit)}
     if not walked:
         return None
     curves = {name: estimated_curves(fit) for name, fit in walked.items()}
-    first = next(iter(fits.values())).skeleton
+    convention, first = convention_of(next(iter(fits.values()))), next(iter(fits.values())).skeleton
     titles = {
-        coordinate.name: load_title(coordinate, "moment")
+        coordinate.name: signed_load_title(coordinate, "moment", convention)
         for coordinate in panels_of(first)
         if coordinate.name in _MOMENTS
     }
     panels = []
-    for joint, title in titles.items():
+    for joint, (title, turned) in titles.items():
         for side in FEET:
             traces = [
-                {**mean_line(sign * mean_curve(own_curves)), "name": plain(name), "line": {"color": colour, "width": 2}}
+                {
+                    **mean_line(turned * sign * mean_curve(own_curves)),
+                    "name": plain(name),
+                    "line": {"color": colour, "width": 2},
+                }
                 for (name, shown), colour in zip(curves.items(), _COLOURS, strict=False)
                 if (own_curves := shown.get((f"{joint}_moment", side)))
                 and (sign := same_sign(joint, side, first, walked[name].skeleton))

@@ -7,7 +7,7 @@ remains are errors of one condition only, and errors that a user waived.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import combinations
 from pathlib import Path
@@ -58,10 +58,12 @@ from kinertia.report.comparison.change_tables import (
     lacking_sentence,
     limit_sentences,
     person_columns,
+    shown_changes,
+    shown_curves,
     speed_sentence,
 )
 from kinertia.report.exports.saved_fit import FIT_FILE, load_fit
-from kinertia.report.figures.coordinate_titles import same_sign
+from kinertia.report.figures.coordinate_titles import OutcomeSigns, outcome_signs, same_sign
 from kinertia.report.pages.rendering import rendered
 from kinertia.workflow.estimate import estimate
 from kinertia.workflow.from_files import fit_subject, prepare_subject
@@ -76,9 +78,8 @@ _NARROW = (
 Norms = Mapping[str, Norm] | None
 Source = Fit | SubjectFile | str | Path
 MARKER_SD_M = 0.010
-"""Of marker positions in their segments: 5 mm each, and 5 mm that markers of a segment share. As independent errors, 10
-mm leave the middle of three to five markers as uncertain as that; with 7 mm, intervals of hip and pelvis angles between
-days held the truth of synthetic people in 69 to 85 %."""
+"""Of marker positions in their segments: 5 mm each, and 5 mm that markers of a segment share. Independent errors of 10
+mm are as large; with 7 mm, intervals of hip and pelvis angles held the truth of synthetic people in 69 to 85 %."""
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,7 @@ class Comparison:
         doubt: findings about instruments that keep changes of moments from being judged.
         note: what else limits the comparison; empty if nothing does.
         person: whether both are of one person, where that is in question; else empty.
+        signs: of sentences and pages; the other attributes, and files, have the library's.
 
     Examples:
         >>> found = kinertia.compare("before/subject.toml", "after/subject.toml")  # doctest: +SKIP
@@ -109,12 +111,13 @@ class Comparison:
     doubt: str = ""
     note: str = ""
     person: str = ""
+    signs: OutcomeSigns = field(default_factory=dict, repr=False)
 
     @property
     def sentences(self) -> tuple[str, ...]:
         """Walking speed, each outcome that was named beforehand, how many of the others changed, and limits."""
-        of_primary = *change_sentences(self.outcomes), lacking_sentence(self.outcomes)
-        said = (speed_sentence(self.speed), *of_primary, changed_sentence(self.outcomes))
+        shown = shown_changes(self.outcomes, self.signs)
+        said = speed_sentence(self.speed), *change_sentences(shown), lacking_sentence(shown), changed_sentence(shown)
         limits = (*limit_sentences(self.outcomes, self.doubt), self.note)
         return tuple(filter(None, (self.person, *said, *limits)))
 
@@ -129,9 +132,9 @@ class Comparison:
             "before": self.before,
             "after": self.after,
             "sentences": self.sentences,
-            "rows": change_rows(self.outcomes),
+            "rows": change_rows(shown_changes(self.outcomes, self.signs)),
             "gait": change_rows(self.steps),
-            "figures": curve_figures(self.curves, self.before, self.after),
+            "figures": curve_figures(shown_curves(self.curves, self.signs), self.before, self.after),
             "relevant": RELEVANT,
         }
 
@@ -281,8 +284,7 @@ def _of_conditions(fit: Fit, conditions: tuple[str, str], progress: Progress, no
     first, other = (session(fit, name) for name in conditions)
     features, condition = condition_features(fit, *conditions, partial(progress, "comparison"))
     found = changes_of_strides(features.events, masks_of(features.events, condition, *conditions))
-    masks = masks_of(features.curves, condition, *conditions)
-    early, late = (rows_of(features.curves, mask) for mask in masks)
+    early, late = (rows_of(features.curves, mask) for mask in masks_of(features.curves, condition, *conditions))
     return _comparison(conditions, first, other, found, curve_changes(early, late, paired), norms)
 
 
@@ -296,7 +298,10 @@ def _of_sessions(
         raise KinertiaError(reason)
     names, person = conditions or ("before", "after"), identity_note(before, after)
     if doubt := why_unjudged(before, after):
-        unjudged = unjudged_changes(first, other, doubt, partial(_sign_in_both, (before, after)))
+        skeletons = before.skeleton, after.skeleton
+        unjudged = unjudged_changes(
+            first, other, doubt, lambda name, side: same_sign(name, side, *skeletons) if side else 0
+        )
         return replace(_comparison(names, first, other, unjudged, (), norms), person=person)
     rows, later = session_features(first, other, partial(progress, "comparison"))
     outcomes = changes_between(rows.events, later.events, first.fixed_axes or other.fixed_axes)
@@ -309,15 +314,9 @@ def _of_sessions(
 
 def _doubted(found: Comparison, why: str) -> Comparison:
     """Let nothing be judged."""
-    outcomes, gait = (
-        tuple(replace(change, doubt=why) for change in changes) for changes in (found.outcomes, found.gait)
-    )
+    outcomes, gait = (tuple(replace(change, doubt=why) for change in some) for some in (found.outcomes, found.gait))
     speed = None if found.speed is None else replace(found.speed, doubt=why)
     return replace(found, outcomes=outcomes, gait=gait, speed=speed)
-
-
-def _sign_in_both(fits: tuple[Fit, Fit], name: str, side: str) -> int:
-    return same_sign(name, side, fits[0].skeleton, fits[1].skeleton) if side else 0
 
 
 def compared_sessions(
@@ -361,7 +360,8 @@ def _comparison(
     )
     walks = first.trials, other.trials
     gait = gait_changes(*walks) + (() if norms is None else _profiles(first, other, norms))
-    return Comparison(*names, judged, speed_change(*walks), gait, tuple(curves), doubt, tasks_note(walks))
+    note, signs = tasks_note(walks), outcome_signs(first.fit)
+    return Comparison(*names, judged, speed_change(*walks), gait, tuple(curves), doubt, note, signs=signs)
 
 
 def _profiles(first: Session, other: Session, norms: Mapping[str, Norm]) -> tuple[Change, ...]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from kinertia.estimation.changes.change import named_outcome
 from kinertia.estimation.result.fit import Fit
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.model_outputs import CLINICAL_ANGLES
@@ -96,6 +97,20 @@ _COORDINATES = {
     "ankle_flexion": "ankle_angle",
 }
 """Coordinates of OpenSim's models that turn about the axes of joint moments."""
+_PELVIS = {
+    "pelvis_tilt": ("pelvis_tilt_clinical", {"r": -1.0, "l": -1.0}),
+    "pelvis_list": ("pelvis_obliquity_clinical", {"r": -1.0, "l": 1.0}),
+    "pelvis_rotation": ("pelvis_rotation_clinical", {"r": 1.0, "l": -1.0}),
+}
+"""Clinical angle of each coordinate of the pelvis, and its sign by side."""
+_ADDUCTION = "external knee adduction"
+"""The one moment that clinics know by its external direction."""
+_MOMENTS = tuple(
+    f"{joint}_{name}" for joint in ("hip", "knee", "ankle") for name in ("flexion", "adduction", "rotation")
+)
+_TRUNK_MOMENTS = ("lumbar_flexion", "lumbar_bending", "lumbar_rotation")
+OutcomeSigns = Mapping[tuple[str, str, str, str], tuple[str, float]]
+"""Positive direction in words, and sign, of what is compared, by quantity, joint, component and side."""
 Signs = Mapping[str, float]
 """Sign by quantity with which a curve is drawn; 1 for those that are not among them."""
 
@@ -258,3 +273,35 @@ def _is_turned(name: str, opposite: str, skeleton: Skeleton) -> bool:
     """Return whether the coordinate about the moment's axis is positive in the opposite direction."""
     titles = {coordinate.name: coordinate.title for coordinate in panels_of(skeleton)}
     return bool(opposite) and f" {opposite} +" in titles.get(_COORDINATES.get(name, ""), "")
+
+
+def outcome_signs(fit: Fit) -> OutcomeSigns:
+    """Return words and signs of what is compared, by the fit's convention; files have the library's signs."""
+    convention, ours = convention_of(fit), fit.skeleton.name == "gait27"
+    result: dict[tuple[str, str, str, str], tuple[str, float]] = {}
+    for side in (*FEET, ""):
+        for name in (*_MOMENTS, *_TRUNK_MOMENTS):
+            title, sign = signed_joint_moment(name, fit.skeleton, convention)
+            turned = name == "knee_adduction" and sign < 0.0
+            result[(*named_outcome(f"moment {name}"), side)] = _ADDUCTION if turned else _direction(title), sign
+        for coordinate in panels_of(fit.skeleton):
+            shown = _direction(coordinate.title) if coordinate.title.endswith(" +") else "", 1.0
+            if ours and side and convention != "opensim" and coordinate.name in _PELVIS:
+                quantity, signs = _PELVIS[coordinate.name]
+                title, sign = signed_angles(convention)[quantity]
+                shown = _direction(title), sign * signs[side]
+            result[(*named_outcome(f"angle {coordinate.name}"), side)] = shown
+    return result
+
+
+def signed_load_title(coordinate: Coordinate, what: str, convention: SignConvention) -> tuple[str, float]:
+    """Return title and sign of the moment about a leg's coordinate by a convention; OpenSim's is the model's own."""
+    title = load_title(coordinate, what)
+    head, comma, direction = title.removesuffix(" +").partition(", ")
+    other = {"clinical": _OPPOSITE, "isb": {word: key for key, word in _OPPOSITE.items()}}.get(convention, {})
+    return (f"{head}{comma}{other[direction]} +", -1.0) if direction in other else (title, 1.0)
+
+
+def _direction(title: str) -> str:
+    words = title.removesuffix(" +")
+    return words[0].lower() + words[1:]
