@@ -107,7 +107,7 @@ def supported_elsewhere(share=0.5, seconds=0.5, complete=0.5):
 def late(seconds, patched, uneven_s=0.0):
     """Loads that begin and end late; where they are uneven, they begin later by this and end earlier by it."""
     delays = SimpleNamespace(
-        grows=lambda: False,
+        grows=lambda start_s: False,
         delay_s=seconds,
         median_s=seconds + np.array([uneven_s, -uneven_s]),
         time=np.zeros((3, 2)),

@@ -32,6 +32,7 @@ from kinertia.diagnostics.plates.free_moments import free_moments, vertical_mome
 from kinertia.diagnostics.plates.gains import gains
 from kinertia.diagnostics.plates.ground_contact import (
     both_feet,
+    compared_with_motion,
     complete_contact,
     foreign_load,
     plate_edges,
@@ -121,6 +122,7 @@ TIMING_CHECKS: tuple[Check[RecordingContext], ...] = (belt_speed, file_events)
 TIMING_PERSON_CHECKS: tuple[Check[PersonContext], ...] = (
     interchanged_forces,
     trial_delays,
+    compared_with_motion,
 )
 SUBJECT_STATIC_CHECKS: tuple[Check[RecordingContext], ...] = (
     standing,

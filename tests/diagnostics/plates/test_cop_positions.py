@@ -100,6 +100,15 @@ def test_offsets_along_the_walk(name, walk, offset_m):
     assert all(np.sign(offset) == np.sign(offset_m * direction(recording)) for offset in along)
 
 
+@pytest.mark.parametrize(("offset_m", "expected"), [(0.033, []), (-0.033, []), (0.037, ["P243"]), (-0.037, ["P243"])])
+def test_the_load_of_the_only_measured_foot_is_near_its_axis(offset_m, expected):
+    """Heel and second metatarsal are the axis; with other markers nobody knows where it is."""
+    recording = moved(simple_walk([("r", 0)]), (0.0, 0.0, offset_m))
+    assert doubted(recording, SIMPLE_FEET) == expected
+    one_marker_more = {"r": (*SIMPLE_FEET["r"], SIMPLE_FEET["l"][0]), "l": SIMPLE_FEET["l"]}
+    assert "P243" not in doubted(recording, one_marker_more)
+
+
 STATURES_M = {"gait2354": 1.803, "plug-in gait a": 1.61}
 
 

@@ -7,7 +7,13 @@ import pytest
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.plates.cop_positions import cop_on_plate
-from kinertia.diagnostics.plates.ground_contact import complete_contact, coverage_of, plate_edges, stance_coverage
+from kinertia.diagnostics.plates.ground_contact import (
+    compared_with_motion,
+    complete_contact,
+    coverage_of,
+    plate_edges,
+    stance_coverage,
+)
 from kinertia.findings.finding import Severity
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.model.marker_set import MarkerSet
@@ -296,6 +302,14 @@ def test_single_legs_are_known_where_contact_is_never_complete():
     )
     few = list(complete_contact(context_of(replace(slow, markers=slow.markers.cut(0.25, 0.33)), FEET)))
     assert [reported.code for reported in few] == ["P279"]
+
+
+@pytest.mark.parametrize(("until_s", "expected"), [((0.62,), ["P291"]), ((0.68,), []), ((0.62, 0.68), [])])
+def test_forces_are_compared_with_motion_where_contact_is_measured_for_long_enough(until_s, expected):
+    """P291 below 0.4 s in all trials."""
+    short = walk([("r", 0)], stance_s=0.55)
+    trials = [context_of(replace(short, markers=short.markers.cut(0.0, end_s)), FEET) for end_s in until_s]
+    assert [finding.code for finding in compared_with_motion(replace(person(), trials=trials))] == expected
 
 
 def found(*recordings: Recording):

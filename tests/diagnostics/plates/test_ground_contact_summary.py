@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gait_loads import RATE_HZ
-from kinertia.diagnostics.plates.cop_positions import off_plate
+from kinertia.diagnostics.evidence.ambiguous_loads import off_plate
 from kinertia.diagnostics.plates.ground_contact import check_plates
 from kinertia.trial.data import Markers, PlateLoads, Recording
 from walk_on_plates import ALL_STEPS, FEET, STRIDE_S, walk

@@ -7,7 +7,15 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory
-from kinertia.diagnostics.evidence.plate_contacts import BETWEEN_M, FAR_M, ONE_STEP_S, Feet, PlateContact
+from kinertia.diagnostics.evidence.plate_contacts import (
+    BETWEEN_M,
+    COP_MIN_FORCE_N,
+    FAR_M,
+    ONE_STEP_S,
+    Feet,
+    PlateContact,
+    cop_horizontal,
+)
 from kinertia.findings.quantity import Limit
 from kinertia.model.marker_set import MarkerSet
 from kinertia.motion.kinematics import FEWEST_FRAMES
@@ -315,3 +323,16 @@ def without_loads(plates: PlateLoads, contacts: Sequence[PlateContact], others: 
                 during &= ~within(plates.time, other.time[0], other.time[-1])
         force[during, contact.plate], moment[during, contact.plate] = 0.0, 0.0
     return replace(plates, force=force, moment=moment)
+
+
+def off_plate(plates: PlateLoads, p: int) -> tuple[float, float] | None:
+    """Return the share of the load of plate `p`, where it is reliable, whose centre of pressure is off it, and how far
+    (m, 95th percentile; 0 where none is); None where the file has no corners or nothing is loaded.
+    """
+    loaded = plates.force[:, p, 1] > COP_MIN_FORCE_N
+    if plates.corners is None or not loaded.any():
+        return None
+    beyond = beyond_edges(plates.corners[p], cop_horizontal(plates)[loaded, p])
+    off = beyond > 0
+    load = plates.force[loaded, p, 1]
+    return float(load[off].sum() / load.sum()), float(np.percentile(beyond[off], 95)) if off.any() else 0.0

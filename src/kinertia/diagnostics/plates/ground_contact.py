@@ -3,6 +3,8 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from kinertia.diagnostics.context import PersonContext, RecordingContext
 from kinertia.diagnostics.evidence.ambiguous_loads import (
     HALLUX_M,
@@ -11,9 +13,10 @@ from kinertia.diagnostics.evidence.ambiguous_loads import (
     OUTSIDE_M,
     OVERHANG_M,
     STRAY_M,
+    off_plate,
 )
+from kinertia.diagnostics.evidence.body_motion import LEAST_WINDOW_S
 from kinertia.diagnostics.evidence.force_mass import FOREIGN_S, FOREIGN_SHARE, MOSTLY
-from kinertia.diagnostics.plates.cop_positions import off_plate
 from kinertia.diagnostics.runner import NEEDS_LOADS_UNDER_FEET, check
 from kinertia.diagnostics.subject.movements import task_of
 from kinertia.errors import KinertiaError
@@ -36,6 +39,7 @@ from kinertia.trial.stances import (
 )
 from kinertia.trial.trial_input import GAIT, Task
 
+_COMPARED_S = Limit(LEAST_WINDOW_S, "s")
 _FOOT_NAMES = {"r": "right", "l": "left", None: "unknown foot"}
 _LISTED = 4
 
@@ -90,6 +94,15 @@ def complete_contact(context: RecordingContext) -> Iterator[Finding]:
     else:
         measured = Quantity(frames, "1", limit=FEWEST_FRAMES)
         yield finding("P279", context.at(span_s=windows[0] if windows else None), frames=measured)
+
+
+@check("P291", window=_COMPARED_S)
+def compared_with_motion(person: PersonContext) -> Iterator[Finding]:
+    """Report P291: contact is nowhere measured for long enough to compare forces with motion."""
+    windows = [window for trial in person.trials if trial.trial is not None for window in trial.trial.windows()]
+    longest_s = max((end - start for start, end in windows), default=np.inf)
+    if longest_s < _COMPARED_S:
+        yield finding("P291", Where(), window_s=Quantity(longest_s, "s", limit=_COMPARED_S))
 
 
 def _too_few_in_window(context: RecordingContext) -> Finding | None:
