@@ -94,11 +94,11 @@ def test_a_foot_on_two_plates_makes_one_step():
     whole = simple_walk([("r", 0), ("l", 0)])
     plates = whole.plates
     first, second = (plates.time[:, None, None] < 0.5), (plates.time[:, None, None] >= 0.45)
-    force, moment = (
-        np.concatenate([of[:, :1] * first, of[:, :1] * second, of[:, 1:]], axis=1)
-        for of in (plates.force, plates.moment)
-    )
-    split = replace(plates, names=("a", "b", "c"), force=force, moment=moment, declared_feet=(None,) * 3)
+    parts = [
+        np.concatenate([load[:, :1] * first, load[:, :1] * second, load[:, 1:]], axis=1)
+        for load in (plates.force, plates.moment)
+    ]
+    split = replace(plates, names=("a", "b", "c"), force=parts[0], moment=parts[1], declared_feet=(None,) * 3)
     context = context_of(replace(whole, plates=split), FEET)
     delays = contact_delays.ContactDelays.of(context.whole_contacts, context.foot_trajectories)
     assert delays.time == pytest.approx(np.array([[0.2, 0.8], [0.7, 1.3]]), abs=0.01)

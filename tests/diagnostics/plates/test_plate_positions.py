@@ -12,6 +12,8 @@ from kinertia.trial.ground_contact import centre_of_pressure
 from kinertia.trial.trial_input import selected
 from loads_and_feet import error_of, feet_of
 from recordings import SYNTHETIC, here, slow_beside
+from walk_on_plates import FEET
+from walk_on_plates import walk as simple_walk
 
 WALKS = here(["synthetic/walk.c3d", "pig_c3d/subject_a_walk.c3d", "pig_c3d/subject_b_walk.c3d"])
 
@@ -175,3 +177,19 @@ def test_selected_plates_keep_what_is_theirs():
     assert np.array_equal(chosen.force, force[:, [0, 2]])
     assert np.array_equal(chosen.moment, 2 * force[:, [0, 2]])
     assert np.array_equal(chosen.corners, replace(plates).corners[[0, 2]])
+
+
+def test_a_plate_that_is_interchanged_with_an_unloaded_one():
+    recording = simple_walk([("r", 0), ("l", 0), ("r", 1)])
+    plates = recording.plates
+    point = centre_of_pressure(np.concatenate((plates.force, plates.moment), axis=2))
+    loaded = plates.force[..., 1] > 0.0
+    middle = np.array([point[shown, p].mean(axis=0) for p, shown in enumerate(loaded.T)])
+    corners = middle[:, None] + np.array([[1, 0, 1], [-1, 0, 1], [-1, 0, -1], [1, 0, -1]]) * [0.3, 0.0, 0.09]
+    idle = np.array([True, True, False])[:, None]
+    force, moment = plates.force * idle, plates.moment * idle
+    order = np.array([0, 2, 1])
+    moment = moment + np.cross(middle[order] - middle, force)
+    wrong = replace(plates, force=force[:, order], moment=moment[:, order], corners=corners)
+    found = error_of(replace(recording, plates=wrong), FEET)
+    assert [found.code, found.evidence["plate"].value, found.evidence["other"].value] == ["P241", "plate 2", "plate 3"]

@@ -156,14 +156,17 @@ def interchanged_plates(context: RecordingContext) -> Iterator[Hypothesis]:
 def _interchanged_pair(
     context: RecordingContext, plates: PlateLoads, feet: Feet, contacts: Sequence[PlateContact]
 ) -> list[Hypothesis]:
-    """Return the two plates, if any, whose interchange puts all these loads under feet."""
-    if len({contact.plate for contact in contacts}) < 2:
+    """Return the two plates, if any, whose interchange puts all these loads under feet; one of them may be unloaded, if
+    the file has its corners."""
+    used = sorted({contact.plate for contact in contacts})
+    every = used if plates.corners is None else list(range(len(plates.names)))
+    pairs = [pair for pair in combinations(every, 2) if not set(pair).isdisjoint(used)]
+    if not pairs:
         return []
     before = max(contact.distance_m for contact in contacts)
-    used = sorted({contact.plate for contact in contacts})
-    middle = _middles(plates, used)
+    middle = _middles(plates, every)
     tried = []
-    for pair in combinations(used, 2):
+    for pair in pairs:
         by = np.zeros((len(plates.names), 2))
         by[pair[0]], by[pair[1]] = middle[pair[1]] - middle[pair[0]], middle[pair[0]] - middle[pair[1]]
         moved = displaced(plates, by)
