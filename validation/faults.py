@@ -54,10 +54,20 @@ made in the files of {walks} walks, one at a time, and given to `kinertia check`
   within a third of a degree in most walks, but within 1.6 degrees in the Gait 2354 walk (60 frames a second), where 3
   degrees may be chance and change moments by two SDs. A note of the fit then states from which angle on its trials
   show a rotation. The path of the centre of pressure under the feet shows less: on fault-free walks, right and left
-  together, it is up to 4 degrees from the line between heel and toe.
+  together, it is up to 4 degrees from the line between heel and toe. Where 3 degrees of all plates or 5 of one go
+  unnoticed, moments change by 1.0 to 1.3 SDs (2 to 4 N m).
 - A wrong height of the plates, if the file does not state it: P249 compares the corners in a C3D file, or the heights
   of the points in a force file, with the feet. Where points computed for a surface 50 mm higher are at 0 in the file,
-  moments change by 1.4 to 1.8 SDs.
+  moments change by 1.4 to 1.8 SDs (2 to 4 N m). Estimated with everything else, the height has an SD of 13 to 24 mm,
+  and is -39 to 8 mm in nine fault-free walks.
+- A late plate, where a foot reaches over its edge (P282): the load that is missing has the same effect. In the
+  Plug-in Gait walk of subject B one plate seems 10 ms early as it is, and 10 ms late with 25 ms; moments change by 2.4
+  SDs (4 N m).
+- The same wrong camera scale in static trial and walk: with 2 %, a person seems 30 mm taller than stated, and people of
+  one stature differ by more. Moments change by 1.1 to 1.4 SDs (1 to 2 N m).
+- Errors of forces, if all contact is measured for less than 0.4 s, as in one step on one plate (P291 says so): in the
+  walk of Clinic MH, 5 % of crosstalk, a vertical 5 degrees off and a rate 10 % off change moments by 18 to 22 N m (3 to
+  4 SDs), plates 50 mm off along the foot by 32 N m.
 - A floor that is too low by less than the height of thick soles. It is identified if the feet's lowest marker is more
   than 50 mm above the floor; on fourteen people it is 23 to 44 mm. The forces would show it within 13 to 24 mm: too
   little.
@@ -68,11 +78,10 @@ made in the files of {walks} walks, one at a time, and given to `kinertia check`
 - A zero offset of one loaded plate, or a gain error below 7.5 %, in less than a second of measured steps: its effect
   cannot be distinguished from the motion of pelvis and limbs relative to each other.
 - Faults reported with another cause, or hardly at all: another person's foot on a plate, a step over its edge and
-  cameras tilted sideways (reported as gains and positions of plates), free moments that are too large, forces of
-  another trial of the same person (as a rate), and the same wrong camera scale in static trial and walk (as positions
-  of plates). An origin of the plates 40 mm too deep is not reported, and moments change by 1.2 to 3 SDs; nor always
-  are centres of pressure that were filtered later than the forces, or half of the cameras' volume being 15 to 30 mm
-  higher.
+  cameras tilted sideways (reported as gains and positions of plates), free moments that are too large, and forces of
+  another trial of the same person (as a rate). An origin of the plates 40 mm too deep is not reported, and moments
+  change by 1.2 to 3 SDs; nor always are centres of pressure that were filtered later than the forces, or half of the
+  cameras' volume being 15 to 30 mm higher.
 - In a person's own OpenSim model: joint centres or axes displaced on both sides equally by 20 to 30 mm or 15 degrees,
   markers of both feet that are 20 mm too far forward in the model, and bones that are 5 to 10 % too long or short
   with markers placed on the person. Joint moments change by 5 to 14 N m, more than their SDs, which take a model's

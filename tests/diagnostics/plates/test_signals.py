@@ -313,6 +313,9 @@ def test_a_dead_moment_channel_keeps_the_centre_of_pressure_on_a_line(recording_
     # a depth of the transducers, which readers account for, brings it to life only for horizontal forces
     deep = moment + np.cross([0.0, 0.04, 0.0], plates.force) * [1.0, 1.0, 1.0]
     assert "P111" in {finding.code for finding in found(replace(plates, moment=deep + about))}
+    # deeper than any, the force of a tilted vertical goes with the moment
+    tilted = moment + np.cross([0.0, 0.15, 0.0], plates.force)
+    assert "P111" not in {finding.code for finding in found(replace(plates, moment=tilted + about))}
 
 
 OTHERS = {

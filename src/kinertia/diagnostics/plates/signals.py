@@ -23,8 +23,8 @@ from kinertia.trial.ground_contact import FIRM_LOAD_N, centre_of_pressure
 from kinertia.trial.plate_signals import LIMITS_N, LONGEST_S
 from kinertia.trial.sampled_data import runs, span_s
 
-_DEAD_N, _DEAD_NM = Limit(0.5, "N"), Limit(0.5, "N m")
-"""Amplifiers have more noise than this."""
+_DEAD_N, _DEAD_NM, _DEEPEST_M = Limit(0.5, "N"), Limit(0.5, "N m"), 0.1
+"""Amplifiers have more noise than the former; transducers are 20 to 60 mm below the surface."""
 _CARRIED_SHARE = Limit(0.4)
 """Share of the median load that a foot at contact or off takes several samples to gain or lose."""
 _DROPPED_S = Limit(0.06, "s")
@@ -111,7 +111,7 @@ def dead_moments(context: RecordingContext) -> Iterator[Finding]:
         about = wrench[:, 3:] - np.cross(middle, wrench[:, :3])
         for edge in edges / np.linalg.norm(edges, axis=1, keepdims=True):
             moment, force = about @ edge, wrench[:, :3] @ np.cross([0.0, 1.0, 0.0], edge)
-            depth = float(force @ moment) / max(float(force @ force), 1e-9)
+            depth = float(np.clip(force @ moment / max(float(force @ force), 1e-9), -_DEEPEST_M, _DEEPEST_M))
             largest = float(np.abs(moment - depth * force).max())
             if largest < _DEAD_NM:
                 axis = int(np.argmax(np.abs(edge)))
