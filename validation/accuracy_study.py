@@ -13,12 +13,13 @@ import numpy as np
 
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.prior import BspPrior
+from kinertia.estimation.simultaneous.fit import with_placement
 from kinertia.estimation.simultaneous.observation import Observation
 from kinertia.estimation.simultaneous.search.problem import MapProblem
 from kinertia.report.pages.truth_comparison import JOINTS
 from kinertia.studies.parallel import in_parallel
 from kinertia.studies.plan import Information
-from kinertia.studies.sensitivity import Scenario, estimate_person
+from kinertia.studies.sensitivity import UNCERTAINTY, Scenario, estimate_person
 from kinertia.synthetic.motions import Faults
 from kinertia.synthetic.walk import SyntheticTrial
 from kinertia.trial.sampled_data import rms
@@ -177,6 +178,8 @@ def run_draw(seed: int, case: tuple[Scenario, int]) -> Draw:
     bound = Information(there, seen.repeats).root(range(len(true)))
     inside = np.flatnonzero(seen.separate[0].dynamic)
     after = Outcome(result.skeleton, result.bsp, result.motions[0].cut(inside), result.reactions[0])
+    placed = result.skeleton.carrying(None), result.motions[0], seen.pooled[0], UNCERTAINTY
+    deviations = with_placement(result.curve_deviations[0], *placed)
     return Draw(
         drawn.errors,
         drawn.literature_errors,
@@ -184,7 +187,7 @@ def run_draw(seed: int, case: tuple[Scenario, int]) -> Draw:
         np.sqrt(np.diag(result.bsp_covariance)).reshape(-1, 10),
         np.linalg.norm(bound, axis=1).reshape(-1, 10),
         attainable(prior, bound, drawn.rng),
-        joint_errors(trial, Before(drawn.skeleton, prior.mean, drawn.recorded[0]), after, result.curve_deviations[0]),
+        joint_errors(trial, Before(drawn.skeleton, prior.mean, drawn.recorded[0]), after, deviations),
         result.converged,
     )
 

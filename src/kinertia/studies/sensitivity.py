@@ -16,7 +16,7 @@ import numpy as np
 from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.simultaneous.fit import calibration_prior
 from kinertia.estimation.simultaneous.instruments.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS
-from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
+from kinertia.estimation.simultaneous.instruments.priors import GAIT27_UNCERTAINTY, InstrumentPrior
 from kinertia.estimation.simultaneous.linear_algebra.motion_basis import Bandwidth
 from kinertia.estimation.simultaneous.mixture_prior import FaultMixture
 from kinertia.estimation.simultaneous.observation import CalibrationPrior, Observations, observe
@@ -70,6 +70,8 @@ SHOWN = PARAMETERS[:7]
 INSENSITIVE = 0.5
 """Share of the literature's error below which an error counts as small."""
 _HELD_SD_M = 1e-4
+UNCERTAINTY = GAIT27_UNCERTAINTY.with_fixed_axes()
+"""As in fits, which do not estimate axes unless they are asked to."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +120,7 @@ def estimate_person(seed: int, case: tuple[Scenario, int]) -> EstimatedPerson:
     trials = [walk(person, scenario.walk_s, trapezoid=False), *(MOTIONS[name](person) for name in scenario.others)]
     skeleton, recorded = measured(trials, scenario.faults, of_noise)
     seen = observe(skeleton, recorded, prior.mass_kg, Bandwidth.of(recorded))
-    calibration = calibration_prior(skeleton) if scenario.calibrated else held(skeleton)
+    calibration = calibration_prior(skeleton, UNCERTAINTY) if scenario.calibrated else held(skeleton)
     result = estimate_simultaneous(skeleton, prior, calibration, seen.pooled, with_draws=False)
     return EstimatedPerson(person, prior, trials, skeleton, recorded, calibration, seen, result, of_noise)
 

@@ -9,12 +9,14 @@ from kinertia.errors import KinertiaError
 from kinertia.estimation.result.drawn_fit import chosen_draws, drawn_fit, drawn_reactions, kept_draws
 from kinertia.estimation.simultaneous.instruments.instrument_errors import GAIN as GAIN_OF_PLATE
 from kinertia.estimation.simultaneous.instruments.plates import GAIN, corrected_loads
+from kinertia.estimation.simultaneous.instruments.priors import GAIT27_UNCERTAINTY
 from kinertia.estimation.simultaneous.linear_algebra.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.uncertainty import posterior_draws
-from kinertia.estimation.simultaneous.uncertainty.model_errors import placement
+from kinertia.estimation.simultaneous.uncertainty.model_errors import fixed_axes, placement
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import TrialDraws
 from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.motion.ground_reactions import GroundReactions
+from kinertia.motion.joint_moments import body_joints
 from kinertia.report.exports.files import write_draws
 from kinertia.report.exports.saved_fit import load_fit, write_fit
 from kinertia.workflow.from_files import prepare_subject
@@ -29,9 +31,17 @@ def sampling(count: int) -> float:
 
 
 def spread_over_reported(moments: np.ndarray, trial) -> np.ndarray:
-    """(j,) RMS deviation over time of drawn joint moments (n, w, c), over the reported one; without the root."""
-    drawn = np.square(moments - trial.joint_loads["estimate"]).mean(axis=(0, 1))
-    reported = np.square(trial.deviations.moments).mean(axis=0)
+    """(j,) RMS deviation over time of drawn joint moments (n, w, c), over the reported one; without the root.
+
+    Draws have the axes of the estimate, fixed where there is one walk.
+    """
+    loads, joints, curves = trial.joint_loads["estimate"], body_joints(trial.skeleton), trial.joint_curves
+    start = int(np.argmin(np.abs(curves.time - trial.time[0])))
+    moments_3d = curves.joints["estimate"].moments[start : start + len(loads)]
+    by_joint = np.concatenate([moments_3d, np.zeros_like(moments_3d)], axis=2).reshape(len(loads), -1)
+    axes = fixed_axes(trial.skeleton, joints, by_joint, loads, GAIT27_UNCERTAINTY.with_fixed_axes().fixed_axes)
+    drawn = np.square(moments - loads).mean(axis=(0, 1))
+    reported = (np.square(trial.deviations.moments) - axes).mean(axis=0)
     return np.sqrt(drawn / reported)[6:]
 
 

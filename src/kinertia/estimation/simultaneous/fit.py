@@ -172,7 +172,7 @@ def fit_simultaneous(
     informed = any(o.dynamic.any() for o in pooled) or bool(uncertainty.instruments.session)
     known = result.curve_deviations if informed else [sd.of_motion_alone() for sd in result.curve_deviations]
     known = [
-        _with_placement(sd, calibrated, motion, observation, uncertainty)
+        with_placement(sd, calibrated, motion, observation, uncertainty)
         for sd, motion, observation in zip(known, result.motions, pooled, strict=False)
     ]
     curves = zip(known, pooled, spans, strict=False)
@@ -189,7 +189,7 @@ def fit_simultaneous(
     )
 
 
-def _with_placement(
+def with_placement(
     deviations: CurveDeviations,
     skeleton: Skeleton,
     motion: Motion,
@@ -292,7 +292,13 @@ def calibration_prior(
     place_sd_m = np.maximum(misplaced_m, _STAYING_SD_M) if known is None else known
     places = np.broadcast_to(place_sd_m, len(skeleton.markers)).copy()
     places[[label in _VIRTUAL_TRUNK for label in skeleton.labels]] = TRUNK_PLACE_SD_M
-    return CalibrationPrior(uncertainty.coordinates, places, uncertainty.instruments, uncertainty.before)
+    return CalibrationPrior(
+        coordinates=uncertainty.coordinates,
+        marker_sd_m=places,
+        instruments=uncertainty.instruments,
+        before=uncertainty.before,
+        fixed_axes=uncertainty.fixed_axes,
+    )
 
 
 def _marker_distances(result: SimultaneousResult, trials: Sequence[Kinematics]) -> tuple[dict[str, float], ...]:

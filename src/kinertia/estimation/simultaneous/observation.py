@@ -139,12 +139,14 @@ class CalibrationPrior:
         marker_sd_m: (m,) of each marker's position in its segment, each axis.
         instruments: priors of plates and synchronisation.
         before: static coordinate -> its value before the trials changed it; for others the skeleton's.
+        fixed_axes: static coordinate that tilts an axis and is no unknown -> standard deviation, rad.
     """
 
     coordinates: Mapping[str, float]
     marker_sd_m: np.ndarray
     instruments: InstrumentPrior
     before: Mapping[str, float] = field(default_factory=dict)
+    fixed_axes: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,13 +17,14 @@ from kinertia.estimation.simultaneous.uncertainty.model_errors import (
     GROWTH,
     LASTS_S,
     block_growth,
+    fixed_axes,
     knee_geometry,
     motion_noise,
     placement,
     with_drawn_knees,
 )
 from kinertia.model.gait27 import LEG_AXIS_TILTS
-from kinertia.motion.dynamics import Motion
+from kinertia.motion.dynamics import Motion, inverse_dynamics
 from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.motion.joint_moments import body_joints, component_signs, joint_axes, joint_moments, joint_wrenches
 from kinertia.synthetic.walk import SyntheticTrial, walk, walking_subject
@@ -89,6 +90,32 @@ def displaced(skeleton, joints, wrenches, centre_m, axis_rad):
         moments = component_signs(joint) * (moved @ axes.T)
         result.append(np.stack([moments, wrench[:, :3] @ segment_axes[joint.child]], axis=1))
     return np.stack(result, axis=1)
+
+
+def test_moments_about_axes_change_as_those_of_tilted_axes():
+    """Of the whole foot's and leg's loads; their weight turns with the axis, which is little beside these."""
+    person = walking_subject()
+    skeleton = walk(person, 1.0, 100.0).skeleton
+    still = Motion(*np.zeros((3, 4, len(skeleton.coordinates))))
+    loads = np.random.default_rng(0).normal(0.0, 1.0, (4, 2, 6)) * [100.0, 700.0, 100.0, 50.0, 20.0, 50.0]
+    joints, sd = body_joints(skeleton), {name: SMALL for name in LEG_AXIS_TILTS}
+    wrenches = joint_wrenches(skeleton, person.bsp, still, loads, joints)
+    by_joint = np.concatenate([np.hstack([wrenches[joint][:, 3:], wrenches[joint][:, :3]]) for joint in joints], axis=1)
+    moments = inverse_dynamics(skeleton, person.bsp, still, loads)
+    variance = fixed_axes(skeleton, joints, by_joint, moments, sd)
+    squares = np.zeros(moments.shape)
+    for name in sd:
+        two = [inverse_dynamics(skeleton.lock({name: sign * SMALL}), person.bsp, still, loads) for sign in (1.0, -1.0)]
+        squares += np.square((two[0] - two[1]) / 2.0)
+    columns = [k for k, name in enumerate(skeleton.coordinates) if name.startswith(("knee_angle", "ankle_angle"))]
+    np.testing.assert_allclose(np.sqrt(variance[:, columns]), np.sqrt(squares[:, columns]), rtol=0.03)
+    others = [k for k, name in enumerate(skeleton.coordinates) if not name.startswith(("knee", "ankle", "subtalar"))]
+    assert not variance[:, others].any()
+    for side in "rl":
+        ankle, subtalar = (skeleton.coordinates.index(f"{name}_angle_{side}") for name in ("ankle", "subtalar"))
+        both = variance[:, [ankle, subtalar]] / SMALL**2 + np.square(moments[:, [ankle, subtalar]])
+        np.testing.assert_allclose(both[:, 0], both[:, 1])
+    assert not fixed_axes(skeleton, joints, by_joint, moments, {}).any()
 
 
 class Drawn:

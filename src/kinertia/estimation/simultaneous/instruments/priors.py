@@ -255,7 +255,8 @@ class ModelUncertainty:
         fixed: parameters of the segments that are not in the prior; None if it has all.
         source: where the prior's mean comes from, for messages.
         axes: static coordinate that tilts a joint's axis -> prior standard deviation, rad.
-        fixed_axes: the same of axes that are no unknowns. Only deviations of angles allow for them.
+        fixed_axes: the same of axes that are no unknowns. Deviations of angles, and of moments about these axes, allow
+            for them.
         moved_m: segment -> RMS distance, along each axis, by which its markers have been adapted to the trials.
             Deviations of angles allow for as much.
         instruments: priors of plates and synchronisation.

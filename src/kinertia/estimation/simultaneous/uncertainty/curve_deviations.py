@@ -23,7 +23,7 @@ from kinertia.estimation.simultaneous.linear_algebra.elimination import Branch, 
 from kinertia.estimation.simultaneous.linear_algebra.normal_equations import write_by_splines
 from kinertia.estimation.simultaneous.search.problem import MapProblem
 from kinertia.estimation.simultaneous.uncertainty.curve_variances import EndSpread, MotionSpread, write_variances
-from kinertia.estimation.simultaneous.uncertainty.model_errors import block_growth, knee_geometry
+from kinertia.estimation.simultaneous.uncertainty.model_errors import block_growth, fixed_axes, knee_geometry
 from kinertia.estimation.simultaneous.uncertainty.moment_derivatives import MomentDerivatives, MomentsOfTrial
 from kinertia.motion.workload import side_by_side
 from kinertia.trial.sampled_data import even_mean
@@ -196,8 +196,12 @@ class _Curves:
         ground = np.square(by.ground @ known[problem.layout.errors]).sum(axis=-1) + by.ground_delay_squares
         noise_n = moments.reactions.noise_n * (by.loads[..., :3] != 0.0)
         variance.ground_forces[rows] = ground.reshape(-1, 2, 3) + np.square(noise_n)
-        variance.moments[rows] += by.delay_squares
-        variance.powers[rows] += by.delay_squares * np.square(self.speed[rows])
+        tilts = problem.calibration.fixed_axes
+        apart = (
+            fixed_axes(problem.skeleton, moments.virtual.joints, joints.by.value, by.value, tilts) + by.delay_squares
+        )
+        variance.moments[rows] += apart
+        variance.powers[rows] += apart * np.square(self.speed[rows])
 
 
 @dataclass(frozen=True)

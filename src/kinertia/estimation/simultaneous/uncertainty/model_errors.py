@@ -1,7 +1,8 @@
 """Adds uncertainty that no unknown has: geometry of the knee, skin that moves as a body, errors that look like motion.
 
 Markers that are centimetres from where the static trial has them were adapted to the trials, and fixed axes are as the
-static trial has them. Both turn the axes of segments throughout a trial: angles are less certain by that.
+static trial has them. Both turn the axes of segments throughout a trial: angles are less certain by that, and so are
+generalised forces, which are moments about these axes.
 
 A knee that is a hinge in the model transmits adduction and rotation moments by constraint. They depend on where its
 centre is and where its axis points, which no equation of motion of the estimate can show: a centre that is displaced
@@ -119,6 +120,35 @@ def knee_geometry(skeleton: Skeleton, joints: Sequence[BodyJoint], loads: np.nda
     """
     by_centre, by_axis = _derivatives(skeleton, joints, loads)
     result: np.ndarray = np.square(CENTRE_SD_M * by_centre) + np.square(AXIS_SD_RAD * by_axis)
+    return result
+
+
+def fixed_axes(
+    skeleton: Skeleton,
+    joints: Sequence[BodyJoint],
+    loads: np.ndarray,
+    moments: np.ndarray,
+    tilts: Mapping[str, float],
+) -> np.ndarray:
+    """Return what fixed axes that may be tilted add to the variances (d, c) of moments about them.
+
+    An axis that is off by a small angle takes its share of the joint's moment about the axes perpendicular to it. The
+    subtalar axis, which has no tilt of its own, is off by as much as the ankle's.
+
+    Args:
+        skeleton: with c coordinates.
+        joints: of it.
+        loads: (d, 6 j) as in `knee_geometry`.
+        moments: (d, c) about the axes of the coordinates.
+        tilts: static coordinate that tilts an axis, in two directions each -> its SD, rad.
+    """
+    result = np.zeros(moments.shape)
+    for k, joint in enumerate(joints):
+        sd_rad = tilts.get(f"{joint.name.lower()}_tilt_1_{joint.side}", 0.0)
+        whole = np.square(loads[:, 6 * k : 6 * k + 3]).sum(axis=1)
+        for column in joint.columns(skeleton) if sd_rad else ():
+            across = np.maximum(whole - np.square(moments[:, column]), 0.0)
+            result[:, column] = np.square(sd_rad) * across
     return result
 
 
