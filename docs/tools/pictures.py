@@ -17,8 +17,8 @@ from examples import ROOT, blocks, link_measured
 FOLDER = ROOT / "docs" / "figures"
 PAGES = {
     "report": ("report.html", "#verdict", [".headline", ".uses"], 1480, 900),
-    "report-cycle": ("report.html", "#moments figure", ["#cycle-joint-moments", ".save button"], 1480, 600),
-    "report-view": ("report.html", "#view", ["canvas", "#view .controls", "#view .legend"], 1180, 920),
+    "report-cycle": ("report.html", "#moments", ["#cycle-joint-moments", ".save button"], 1480, 600),
+    "report-view": ("report.html", "#view", ["canvas", "#view .controls"], 1180, 920),
     "check": ("check.html", "#recording2", ["#recording2-forces", "#recording2-pressure"], 1180, 1060),
 }
 """Picture: page, the part of it, what is numbered there, width, and height from its top in px."""

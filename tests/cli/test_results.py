@@ -4,6 +4,7 @@ import json
 import shutil
 
 import numpy as np
+import openpyxl
 import pandas as pd
 import pytest
 from scipy.io import loadmat
@@ -109,6 +110,9 @@ def test_a_workbook_holds_the_strides_side_by_side(fit, results):
         assert list(kept) == ["N m/kg", "SD (N m/kg)"]
         np.testing.assert_allclose(kept.to_numpy(float), stride[["value", "sd"]].to_numpy(), rtol=1e-12)
     peaks = pd.read_excel(folder / "tables.xlsx", sheet_name="Peaks")
+    widths = openpyxl.load_workbook(folder / "tables.xlsx")["Peaks"].column_dimensions
+    assert widths["F"].width > peaks.peak.str.len().max()
+    assert not sheets["Clinical angles"].iloc[5].astype(str).str.startswith("SD").any(), "there are none"
     pd.testing.assert_frame_equal(peaks, fit.peaks, check_dtype=False, rtol=1e-12)
 
 

@@ -145,3 +145,8 @@ def test_the_camera_goes_on_where_the_pelvis_is_not_seen(walked):
     whole = marker_scene(walked.recording, walked.used_set, 10_000)
     np.testing.assert_allclose(shown.centre, whole.centre, atol=0.02)
     np.testing.assert_array_equal(shown.centre[:100], whole.centre[:100])
+
+
+def test_legends_of_the_check_have_at_most_four_entries(walked):
+    for figure in (force_figure(walked), pressure_figure(walked)):
+        assert 1 <= len({trace["name"] for trace in figure.data if trace.get("showlegend", True)}) <= 4

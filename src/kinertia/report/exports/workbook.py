@@ -3,7 +3,7 @@
 import json
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +43,8 @@ _TITLES = {
     "bsp": "Body segments",
     "calibration": "Calibration",
 }
+_NARROWEST = 10
+"""Least width of a column, in letters."""
 _NAMED_BY = ("quantity", "trial", "task", "side", "stride")
 
 
@@ -167,17 +169,21 @@ def _fields(table: Table) -> dict[str, Any]:
 
 def write_xlsx(fit: Fit, path: Path) -> None:
     """Write a workbook. Sheets of curves have a row per percent of the gait cycle, and two columns per stride: values
-    and standard deviations. What is not known is an empty cell.
+    and standard deviations if there are any. What is not known is an empty cell. Columns are as wide as their words.
     """
     from openpyxl import Workbook
+    from openpyxl.utils import get_column_letter
 
     book, tables = Workbook(write_only=True), person_tables(fit)
 
-    def write(title: str, rows: Iterator[Sequence[Any]], below: str | None) -> None:
-        sheet = book.create_sheet(title)
+    def write(title: str, rows: Iterable[Sequence[Any]], below: str | None) -> None:
+        sheet, written = book.create_sheet(title), [[plain(value) for value in row] for row in rows]
         sheet.freeze_panes = below
-        for row in rows:
-            sheet.append([plain(value) for value in row])
+        for k, column in enumerate(zip(*written, strict=True)):
+            longest = max((len(value) for value in column if isinstance(value, str)), default=0)
+            sheet.column_dimensions[get_column_letter(k + 1)].width = max(_NARROWEST, longest + 2)
+        for row in written:
+            sheet.append(row)
 
     write("About", _about(fit), None)
     for name in ("spatiotemporal", "moment_peaks"):
@@ -186,7 +192,7 @@ def write_xlsx(fit: Fit, path: Path) -> None:
     if "cycles" in tables:
         for ending, title, kind in _CURVES:
             if rows := list(_side_by_side(tables["cycles"], ending, UNITS[kind])):
-                write(title, iter(rows), f"B{len(_NAMED_BY) + 2}")
+                write(title, rows, f"B{len(_NAMED_BY) + 2}")
     for name in ("contact_phases", "bsp", "calibration"):
         if name in tables:
             write(_TITLES[name], _rows(tables[name]), "A2")
@@ -203,6 +209,8 @@ def _about(fit: Fit) -> Iterator[Sequence[Any]]:
         "One row per percent of the gait cycle, from heel strike to heel strike of the side named above the column.",
     )
     yield "SD", "Standard deviation; twice as much to either side is a 95 % interval. Empty where nothing is known."
+    yield "Moments", "Internal, per body mass. hip_flexion is positive where it flexes; ankle_flexion is dorsiflexion."
+    yield "Peaks", "Positive in the direction that their names state."
 
 
 def _rows(table: Table) -> Iterator[Sequence[Any]]:
@@ -216,11 +224,12 @@ def _side_by_side(cycles: Table, ending: str, unit: str) -> Iterator[Sequence[An
     chosen = [row for row, quantity in enumerate(named["quantity"]) if _ending(quantity) == ending]
     if not chosen:
         return
-    for name in _NAMED_BY:
-        yield [name, *(named[name][row] for row in chosen for _ in ("value", "sd"))]
-    yield ["percent", *(cell for _ in chosen for cell in (unit, f"SD ({unit})"))]
     values, sd = (np.reshape(np.asarray(cycles[name], dtype=float), (-1, len(PERCENT))) for name in ("value", "sd"))
-    columns = np.stack([values[chosen], sd[chosen]], axis=1).reshape(-1, len(PERCENT))
+    kinds = (unit, f"SD ({unit})") if np.isfinite(sd[chosen]).any() else (unit,)
+    for name in _NAMED_BY:
+        yield [name, *(named[name][row] for row in chosen for _ in kinds)]
+    yield ["percent", *(cell for _ in chosen for cell in kinds)]
+    columns = np.stack([values[chosen], sd[chosen]], axis=1)[:, : len(kinds)].reshape(-1, len(PERCENT))
     for percent, row in zip(cells(PERCENT), cells(columns.T), strict=True):
         yield [percent, *row]
 

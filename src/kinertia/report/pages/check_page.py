@@ -245,7 +245,7 @@ def _from_above(traces: Sequence[dict[str, Any]], alt: str) -> Figure:
     data, named = [], set()
     for trace in traces:
         rest = {name: value for name, value in trace.items() if name not in ("X", "Z")}
-        first = trace["name"] not in named
+        first = trace["name"] not in named and trace.get("showlegend", True)
         named.add(trace["name"])
         places = {"x": compact(trace[across]), "y": compact(trace[along])}
         data.append({"type": "scatter", **rest, **places, "legendgroup": trace["name"], "showlegend": first})
