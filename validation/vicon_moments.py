@@ -147,17 +147,30 @@ def known_share(stance: pd.DataFrame) -> float:
     return float(stance["ours"].notna().mean())
 
 
+def explained(stance: pd.DataFrame, row: list[str]) -> tuple[float, ...]:
+    """Return the difference of a row's peak with Vicon's centre and axes, and with the forces as measured, too."""
+    side, joint = row[2].split()
+    key = {"recording": row[0], "trial": row[1], "joint": joint, "side": side[0], "component": COMPONENTS[0]}
+    alike = stance[list(key)].eq(pd.Series(key)).all(axis=1)
+    some = stance[alike & stance["inside"]].dropna(subset="ours")
+    return tuple(float(some[name].max() - some["vicon"].max()) for name in ("vicon_axes", "as_measured"))
+
+
 def document(compared: list[tuple[list[str], float]], stance: pd.DataFrame, apart: list[tuple[str, np.ndarray]]) -> str:
     """Return the text of docs/validation/vicon-moments.md."""
-    heads = ["recording", "trial", "joint", "Vicon", "Kinertia, 95 %", "difference", "corrected"]
-    means = []
+    heads = ["recording", "trial", "joint", "Vicon", "Kinertia, 95 %", "difference", *_EXPLAINED, "corrected"]
+    every = [(row, np.array([off, *explained(stance, row)])) for row, off in compared]
+    means, results = [], []
     for joint in ("ankle", "knee", "hip"):
-        off = np.array([off for row, off in compared if row[2].endswith(joint)])
-        within = f"{(np.abs(off) <= 0.1).sum()} of {len(off)}"
-        means.append([joint, within, f"{off.mean():+.2f}", f"{np.sqrt(np.square(off).mean()):.2f}"])
+        off = np.array([offs for row, offs in every if row[2].endswith(joint)])
+        within = [f"{count} of {len(off)}" for count in (np.abs(off) <= 0.1).sum(axis=0)]
+        rms = float(np.sqrt(np.square(off[:, 0]).mean()))
+        means.append([joint, within[0], f"{off[:, 0].mean():+.2f}", f"{rms:.2f}", *within[1:]])
+    for row, offs in every:
+        results.append([*row[:-1], *(f"{off:+.2f}" for off in offs[1:]), row[-1]])
     return TEXT.format(
-        summary=table(["joint", "within 0.1 N m/kg", "mean", "RMS"], means),
-        results=table(heads, [row for row, _ in compared]),
+        summary=table(["joint", "within 0.1 N m/kg", "mean", "RMS", *_EXPLAINED], means),
+        results=table(heads, results),
         stance=stance_table(stance),
         correlations=correlations_table(stance),
         centres=centres_table(apart),
@@ -204,7 +217,8 @@ to ankle, not beside it, and Kinertia takes the ankle's direction from it: the l
 
 ## Peaks
 
-Peak extension moments (ankle: plantarflexion), N m/kg, within the frames in which all contact is on plates.
+Peak extension moments (ankle: plantarflexion), N m/kg, within the frames in which all contact is on plates. *Same
+axes* and *same forces* as above: how many are within 0.1 N m/kg of Vicon's then, and by how much each peak differs.
 
 {summary}
 

@@ -22,6 +22,8 @@ AWAY = Limit(-0.3, usual=(0.2, 1.0))
 MUCH_SMALLER = Limit(0.5)
 _LEAST_WAY, _POINTING, _FEWEST = 0.03, Limit(0.5, usual=(0.72, 0.94)), 10
 
+_CAUSES = ("a reversed axis or channel", "a vertical that is tilted by some degrees, which looks alike in single steps")
+
 
 def forces_of_steps(context: RecordingContext) -> Iterator[Finding]:
     """Report P231 and P232 where forces point away from the body, or beside it."""
@@ -56,6 +58,7 @@ def forces_of_steps(context: RecordingContext) -> Iterator[Finding]:
             context.at(**context.along(axis)),
             correlation=Quantity(cosines[axis], "1", limit=AWAY, usual=AWAY.usual),
             beside=Quantity(" and the vertical moment" if moment_reversed(context.plates, axis) else ""),
+            causes=_CAUSES,
         )
 
 
