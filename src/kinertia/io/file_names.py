@@ -1,5 +1,6 @@
-"""Makes names of files and folders valid on every system, reads Windows paths elsewhere, and quotes for shells."""
+"""Makes names of files and folders valid on every system, matches files by them, and quotes them for shells."""
 
+import difflib
 import os
 import re
 import shlex
@@ -14,6 +15,8 @@ _FORBIDDEN = re.compile(r'[<>:"/\\|?*\x00-\x1f]|[ .]$')
 
 PYTHON = (sys.executable, "-P")
 """Python which imports nothing from the folder that it is started in: a file coverage.py there is somebody's data."""
+NEXUS_MEASURES = ".mp"
+"""Ending of the measures that Vicon Nexus keeps beside a person's recordings."""
 RESULT_FILES = ("fit.json", "report.html", "bsp.csv", "model.osim", "model_changes.csv")
 """Result files beside the folders of several trials."""
 
@@ -74,3 +77,27 @@ def command_line(words: Sequence[str], windows: bool = os.name == "nt") -> str:
     """Join words to one line that a shell splits into these again: cmd and PowerShell do not support POSIX single
     quotes."""
     return subprocess.list2cmdline(words) if windows else shlex.join(words)
+
+
+def matched_by_name(wanting: Sequence[Path], offered: Sequence[Path]) -> dict[Path, Path]:
+    """Match files by the longest common part of their names, the best pair first; each file once.
+
+    First come names that have the other as a whole word, however short: DJ1 and DJ1_forces, but not DJ12. Of others at
+    least four letters must agree, unless there is one file on each side.
+    """
+    scores = {}
+    for wants in wanting:
+        for offers in offered:
+            wanted, other = wants.stem.lower(), offers.stem.lower()
+            matcher = difflib.SequenceMatcher(None, wanted, other, autojunk=False)
+            scores[wants, offers] = (_has_word(other, wanted), matcher.find_longest_match().size, matcher.ratio())
+    least = 0 if len(wanting) == len(offered) == 1 else 4
+    pairs: dict[Path, Path] = {}
+    for (wants, offers), score in sorted(scores.items(), key=lambda item: item[1], reverse=True):
+        if (score[0] or score[1] >= least) and wants not in pairs and offers not in pairs.values():
+            pairs[wants] = offers
+    return pairs
+
+
+def _has_word(text: str, word: str) -> bool:
+    return re.search(rf"(?<![a-z0-9]){re.escape(word)}(?![a-z0-9])", text) is not None

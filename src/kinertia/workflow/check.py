@@ -18,8 +18,9 @@ from kinertia.errors import FileError
 from kinertia.findings.finding import Finding
 from kinertia.findings.overview import Overview
 from kinertia.findings.quantity import Quantity
+from kinertia.io.file_names import matched_by_name
 from kinertia.io.recording import FORCE_FILES, MARKER_FILES, expect_recording, read_recording
-from kinertia.io.subject.draft import STATIC_NAME, matched_by_name
+from kinertia.io.subject.draft import STATIC_NAME
 from kinertia.io.text.qualisys import is_plate_file
 from kinertia.model.imported_model import OsimModel
 from kinertia.model.marker_set import MarkerSet

@@ -27,7 +27,11 @@ def test_from_a_dropped_folder_to_the_letter_in_ten_clicks(tab, tmp_path, c3d_la
     page = tab.page
     page.add_init_script(COUNTED)
     page.reload()
-    tab.drag(folder_of(tmp_path / "Anna", c3d_lab)).arrived()
+    folder = folder_of(tmp_path / "Anna", c3d_lab)
+    for companion in ("walk.Trial.enf", "walk.history", "Anna.vsk"):
+        (folder / companion).write_text("of Nexus")
+    tab.drag(folder).arrived()
+    assert page.locator(".problems li").count() == 0
     assert page.locator(".message.error").count() == 0, "no error before anything was typed"
     assert "line " not in " ".join(page.locator(".message").all_inner_texts())
     tab.fill(sex="male", mass="72.6", height="1.803").check().checked()

@@ -401,3 +401,35 @@ def test_init_drafts_no_marker_set_where_a_preset_fits(tmp_path):
     files = init_files(tmp_path)
     assert set(files) == {"subject.toml"}
     assert '# markers = "cleveland-clinic"' in files["subject.toml"]
+
+
+NEXUS = """$Bodymass = 61.5
+$Height = 1702
+$InterAsisDistance = 0
+$LKneeWidth = 102
+$RKneeWidth = 104.5
+$LAnkleWidth = 71,5
+$RAnkleWidth = 0
+$LElbowWidth = 900
+"""
+
+
+def test_measures_of_nexus_are_drafted_where_no_recording_states_them(tmp_path, sample_walk):
+    for name in ("subject01_static.trc", "subject01_walk1.trc", "subject01_walk1_grf.mot"):
+        shutil.copy(sample_walk / "gait2354" / name, tmp_path)
+    (tmp_path / "Anna.mp").write_text(NEXUS, encoding="utf-8")
+    subject = tomllib.loads(init_subject(tmp_path))["subject"]
+    assert subject == {"mass_kg": 61.5, "height_m": 1.702, "knee_width_mm": 103.2, "ankle_width_mm": 71.5}
+    stated = tomllib.loads(init_files(tmp_path, stated={"mass_kg": 60.0})["subject.toml"])["subject"]
+    assert (stated["mass_kg"], stated["height_m"]) == (60.0, 1.702)
+    (tmp_path / "Ben.mp").write_text(NEXUS, encoding="utf-8")
+    assert tomllib.loads(init_subject(tmp_path))["subject"] == {}, "of two people, nobody knows whose"
+
+
+def test_a_c3d_file_that_states_mass_and_stature_precedes_measures_of_nexus(tmp_path, c3d_lab):
+    for file in c3d_lab.iterdir():
+        shutil.copy(file, tmp_path)
+    stated = tomllib.loads(init_subject(tmp_path))["subject"]
+    (tmp_path / "Anna.mp").write_text(NEXUS, encoding="utf-8")
+    both = tomllib.loads(init_subject(tmp_path))["subject"]
+    assert both.items() >= stated.items()

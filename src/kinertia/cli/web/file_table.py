@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from kinertia.errors import SettingsError
-from kinertia.io.file_names import last_part
+from kinertia.io.file_names import NEXUS_MEASURES, last_part
 from kinertia.io.marker_set_file import preset_names
 from kinertia.io.subject.body_files import is_measures_sheet
 from kinertia.io.subject.draft import STATIC_NAME, has_force_columns, holds_loads, is_capture
@@ -80,6 +80,8 @@ def _kind(file: Path, capture: bool, captures: Sequence[Path]) -> tuple[str, tup
         return "body segment parameters of an earlier fit", (("bsp", "prior of the estimate"), unused)
     if is_measures_sheet(file):
         return "girths and lengths of the person", (("measures", "body measurements"), unused)
+    if suffix == NEXUS_MEASURES:
+        return "measures of the person (Nexus), read where no entry has them", ()
     if suffix in (".toml", ".csv"):
         return "used only where the text of the subject file names it", ()
     return "nothing that Kinertia reads", ()

@@ -24,7 +24,7 @@ from typing import Any
 
 from kinertia.cohort.record import inputs_of
 from kinertia.errors import FileError, KinertiaError
-from kinertia.io.file_names import fits_everywhere, last_part, same_folder
+from kinertia.io.file_names import NEXUS_MEASURES, fits_everywhere, last_part, same_folder
 from kinertia.io.output_folder import check_folder, write_then_rename
 from kinertia.io.recording import FORCE_FILES, MARKER_FILES
 from kinertia.io.subject.provenance import sha256
@@ -41,7 +41,7 @@ _NOTING = threading.Lock()
 """Check, fit and page note what they know of a person at the same time."""
 LARGEST_FILE_MB, LARGEST_PERSON_MB, MOST_FILES = 500, 2000, 200
 """Limits of one file, of all files of a person, and of their number; pages state them."""
-ENDINGS = tuple(dict.fromkeys((*MARKER_FILES, *FORCE_FILES, ".xml", ".osim", ".toml")))
+ENDINGS = tuple(dict.fromkeys((*MARKER_FILES, *FORCE_FILES, ".xml", ".osim", ".toml", NEXUS_MEASURES)))
 LIMITS = {"file_mb": LARGEST_FILE_MB, "person_mb": LARGEST_PERSON_MB, "files": MOST_FILES, "endings": ENDINGS}
 """Limits as stated on pages."""
 _LONGEST_NAME_BYTES, _LARGEST_TOML_MB = 150, 1

@@ -1,4 +1,4 @@
-"""Reads what a C3D file states besides markers and forces: gait events, and the person's mass, stature and measures.
+"""Reads what C3D files state besides markers and forces: gait events, and the person's mass, stature and measures.
 
 The format has no place for them. Vicon's Plug-in Gait writes them to PROCESSING (`Bodymass` in kg, `Height` and
 `LKneeWidth` in mm), others to SUBJECTS or SUBJECT, in spellings and units of their own. Nothing is read from a file
@@ -43,6 +43,7 @@ _OTHER_LENGTH = re.compile(r"(Width|Length|Distance|Thickness|ShoulderOffset|Sol
 _SUBJECT = re.compile(r"^[A-Z]_")
 _UNIT = re.compile(r"[\s_([]+(kg|mm|cm|m)[])]?\s*$", re.IGNORECASE)
 _NUMBER = re.compile(r"\s*(\d+(?:[.,]\d+)?)\s*(kg|mm|cm|m)?\s*", re.IGNORECASE)
+_NEXUS_LINE = re.compile(r"^[ \t]*\$(\w+)[ \t]*=[ \t]*([\d.,]+)[ \t]*$", re.MULTILINE)
 _PER_METRE = {"mm": 1000.0, "cm": 100.0, "m": 1.0}
 _MASS_KG, _HEIGHT_M, _BMI = (8.0, 300.0), (0.5, 2.5), (7.0, 90.0)
 """Plausible ranges for people who walk, from children of one year on."""
@@ -272,6 +273,14 @@ def subject_data(path: Path, parameters: Any) -> SubjectData:
     if height is not None or lengths:
         found.append(finding("F124", Where(path.name), unit=Quantity(unit or "mm")))
     return SubjectData(mass, height, lengths, [*found, *doubted])
+
+
+def nexus_measures(path: Path) -> SubjectData:
+    """Read the person's data from the measures that Vicon Nexus keeps beside its recordings: `$Bodymass = 60`, lengths
+    in mm, zero where nothing was measured.
+    """
+    lines = _NEXUS_LINE.findall(path.read_text(encoding="utf-8", errors="replace"))
+    return subject_data(path, {"PROCESSING": {key: {"value": [value]} for key, value in lines}})
 
 
 def _numbers(parameters: Any) -> Iterator[tuple[str, tuple[float, str | None]]]:

@@ -1,6 +1,5 @@
 """Drafts a first subject file from the recordings in a folder: `kinertia init`."""
 
-import difflib
 import json
 import os
 import re
@@ -11,7 +10,8 @@ from typing import Any
 
 from kinertia.errors import FileError, KinertiaError, MarkerSetError, missing_file
 from kinertia.findings.quantity import Quantity
-from kinertia.io.file_names import RESULT_FILES
+from kinertia.io.c3d.file_contents import SubjectData, nexus_measures
+from kinertia.io.file_names import NEXUS_MEASURES, RESULT_FILES, matched_by_name
 from kinertia.io.marker_set_draft import MarkerSetDraft, draft_marker_set, preset_of
 from kinertia.io.marker_set_file import marker_set_of, preset_name
 from kinertia.io.recording import ADDED_FILES, CORTEX, MARKER_FILES, read_recording
@@ -55,11 +55,12 @@ def init_files(
 
     The static trial is identified by its name ("static", "cal"), else it is the shortest recording without movement.
     Forces and loads belong to the trial with the most similar name; if the folder has none and `nearby` is True,
-    folders in it and beside it are searched. Mass and height come from a C3D file that states them. The only OpenSim
-    model of a folder replaces a static trial that no name identifies; other models are commented lines. A sheet of
-    girths and lengths is used, but not with a model, whose segments are defined differently; of several sheets one must
-    be chosen. Unknown entries, and trials without forces, are commented lines marked FILL IN. Recordings whose names
-    begin like another static trial's are left out and listed in a comment.
+    folders in it and beside it are searched. Mass and height come from a C3D file that states them, else from Nexus'
+    measures (.mp), as do joint widths. The only OpenSim model of a folder replaces a static trial that no name
+    identifies; other models are commented lines. A sheet of girths and lengths is used, but not with a model, whose
+    segments are defined differently; of several sheets one must be chosen. Unknown entries, and trials without forces,
+    are commented lines marked FILL IN. Recordings whose names begin like another static trial's are left out and listed
+    in a comment.
 
     Args:
         folder: the folder.
@@ -85,7 +86,9 @@ def init_files(
     text = [f"# Drafted from the files in {folder.name}: complete the lines marked FILL IN, check the rest."]
     if others:
         text += [f"# Left out (another subject's, another static trial, or also there as C3D): {', '.join(others)}."]
-    text += ["", "[subject]", *_subject_lines([file for file in (static, *trials) if file in c3d], stated)]
+    nexus = [file for file in files if file.suffix.lower() == NEXUS_MEASURES]
+    measured = nexus_measures(nexus[0]) if len(nexus) == 1 else None
+    text += ["", "[subject]", *_subject_lines([file for file in (static, *trials) if file in c3d], measured, stated)]
     wanted = marker_set and not by_model and not (folder / MARKER_SET).exists()
     preset, draft = _marker_set(static, trials) if wanted else ("", None)
     text += ["", "[model]"]
@@ -207,14 +210,24 @@ def _entry(table: type[Table], key: str, value: object, example: object = None, 
     return entry_line(table, key, value, note)
 
 
-def _subject_lines(c3d: Sequence[Path], stated: Mapping[str, object]) -> list[str]:
+def _subject_lines(c3d: Sequence[Path], measured: SubjectData | None, stated: Mapping[str, object]) -> list[str]:
     recordings = [recording for recording in map(_recording, c3d) if recording]
     lines = [_entry(Subject, "sex", stated.get("sex"), "female")]
     for key, example in (("mass_kg", 70.0), ("height_m", 1.7)):
         filed = next((getattr(recording, key) for recording in recordings if getattr(recording, key)), None)
+        source = "C3D" if filed else NEXUS_MEASURES
+        filed = filed or getattr(measured, key, None)
         value = filed and float(f"{filed:.6g}")  # 32.1, not the 32.099998 of a C3D's single precision
         from_file = bool(value) and key not in stated
-        lines.append(_entry(Subject, key, stated.get(key, value), example, " (from C3D)" if from_file else ""))
+        lines.append(_entry(Subject, key, stated.get(key, value), example, f" (from {source})" if from_file else ""))
+    known = {key for recording in recordings for key in recording.measurements}
+    lengths_m = {} if measured is None else measured.measurements
+    for joint in ("Knee", "Ankle", "Elbow"):
+        if widths := [
+            lengths_m[key] for key in (f"R{joint}Width", f"L{joint}Width") if key in lengths_m.keys() - known
+        ]:
+            width_mm = round(1e3 * sum(widths) / len(widths), 1)
+            lines.append(_entry(Subject, f"{joint.lower()}_width_mm", width_mm, note=f" (from {NEXUS_MEASURES})"))
     age = entry_line(Subject, "age_years", stated.get("age_years", 30))
     return [*lines, age if "age_years" in stated else f"# {age}"]
 
@@ -372,27 +385,3 @@ def _unread(files: Sequence[Path]) -> str:
         f" {', '.join(unread)}: no columns like ground_force_vx; rename them, or put the ExternalLoads file (.xml) "
         "beside it that says which column is what."
     )
-
-
-def matched_by_name(wanting: Sequence[Path], offered: Sequence[Path]) -> dict[Path, Path]:
-    """Match files by the longest common part of their names, the best pair first; each file once.
-
-    First come names that have the other as a whole word, however short: DJ1 and DJ1_forces, but not DJ12. Of others at
-    least four letters must agree, unless there is one file on each side.
-    """
-    scores = {}
-    for wants in wanting:
-        for offers in offered:
-            wanted, other = wants.stem.lower(), offers.stem.lower()
-            matcher = difflib.SequenceMatcher(None, wanted, other, autojunk=False)
-            scores[wants, offers] = (_has_word(other, wanted), matcher.find_longest_match().size, matcher.ratio())
-    least = 0 if len(wanting) == len(offered) == 1 else 4
-    pairs: dict[Path, Path] = {}
-    for (wants, offers), score in sorted(scores.items(), key=lambda item: item[1], reverse=True):
-        if (score[0] or score[1] >= least) and wants not in pairs and offers not in pairs.values():
-            pairs[wants] = offers
-    return pairs
-
-
-def _has_word(text: str, word: str) -> bool:
-    return re.search(rf"(?<![a-z0-9]){re.escape(word)}(?![a-z0-9])", text) is not None

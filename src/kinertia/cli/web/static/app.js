@@ -72,6 +72,9 @@
   const form = document.getElementById("entries");
   const entries = form && new Entries(form);
 
+  // what Vicon Nexus keeps beside its C3D files in a session's folder
+  const OF_NEXUS = /\.(enf|history|mkr|vsk|vst|vpf|x1d|x2d|xcp|system|avi|vvid)$/i;
+
   class Drop {
     constructor(root) {
       this.root = root;
@@ -100,7 +103,7 @@
 
     async take(files, folder) {
       this.problems.textContent = "";
-      const chosen = files.filter((file) => !file.name.startsWith("."));
+      const chosen = files.filter((file) => !file.name.startsWith(".") && !(folder && OF_NEXUS.test(file.name)));
       if (!chosen.length) return this.problem("No files in it.");
       try {
         const wrong = entries && (await entries.keep());
