@@ -21,9 +21,9 @@ _PAGE = """# Accuracy of the simultaneous estimate
 
 Results for synthetic people, whose true values are known, in fourteen laboratories with different errors.
 
-**[Joint moments](#joint-moments)** are as good as the usual pipeline's or better at every joint in every laboratory, but
-for ankles where axes are 5 degrees off (3 % worse). At legs and back, errors are 0.1 to 0.5 times the usual ones where
-instruments or joint centres are wrong and calibrated, and 0.1 to 1.0 times where they are exact.
+**[Joint moments](#joint-moments)** are as good as the usual pipeline's or better at every joint in every laboratory,
+but for ankles where axes are 5 degrees off (3 % worse). At legs and back, errors are 0.1 to 0.5 times the usual ones
+where instruments or joint centres are wrong and calibrated, and 0.1 to 1.0 times where they are exact.
 
 **[Error bars](#error-bars)** of masses, CoMs and inertias hold everywhere: the truth is covered in 94 to 98 %. Those of
 joint moments are rather too long: 94 to 100 % per joint. With calibration errors, which they allow for, they are 1.0 to
