@@ -193,9 +193,7 @@ def test_the_command_compares_conditions_of_a_result(twice, fit, tmp_path):
         assert len(table) > 50
         page = (tmp_path / "c" / "compare.html").read_text(encoding="utf-8")
         parts = table["quantity"].isin(["moment", "angle"]).sum()
-        assert page.count("<tr") == len(table) + parts + 4, (
-            "a row for each change, for its parts, and for four headings"
-        )
+        assert page.count("<tr") == len(table) + parts + 4, "a row for each change, its parts, and four headings"
         curves = pd.read_csv(tmp_path / "c" / "change_curves.csv")
         assert set(curves["percent"]) == set(range(101))
         assert {"knee", "hip", "ankle"} <= set(curves["joint"])
