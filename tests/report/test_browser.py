@@ -248,11 +248,11 @@ def pages(page, **paper):
     return len(re.findall(rb"/Type\s*/Page\b", page.pdf(**paper)))
 
 
-@pytest.mark.parametrize("findings", [FAULT_FREE, UNUSABLE])
-def test_the_letter_is_two_pages_whatever_was_found(browser, fit, tmp_path, findings):
+@pytest.mark.parametrize(("findings", "norms"), [(FAULT_FREE, False), (UNUSABLE, False), (UNUSABLE, True)])
+def test_the_letter_is_two_pages_whatever_was_found(browser, fit, tmp_path, findings, norms):
     """On A4 and on Letter; the three steps that come first are on it."""
     path = tmp_path / "report.html"
-    path.write_text(render(replace(fit, findings=findings, rules=61)), encoding="utf-8")
+    path.write_text(page_of(replace(fit, findings=findings, rules=61), norms), encoding="utf-8")
     page = Opened(browser, path).page
     page.evaluate("window.print = () => {}")
     for paper in ({"prefer_css_page_size": True}, {"format": "Letter"}):
