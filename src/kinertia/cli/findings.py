@@ -252,7 +252,7 @@ def explain(
     kinertia explain P21
     """
     wanted = code.strip().upper()
-    from kinertia.diagnostics.limits import with_limits  # loads all checks and readers
+    from kinertia.diagnostics.limits import with_limits  # loads all checks
 
     found = [with_limits(rule(matched)) for matched in matching(wanted)]
     if not found:

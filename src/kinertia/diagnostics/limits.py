@@ -22,11 +22,8 @@ from kinertia.estimation.prepared import CALIBRATED_M, KNOWN_BODY_SD, LIGHT_KG, 
 from kinertia.findings.display import exact
 from kinertia.findings.quantity import Limit
 from kinertia.findings.rule import Rule
-from kinertia.io.c3d.reader import PERSON_M
 from kinertia.io.lab_plates import MOMENTS_FIT
-from kinertia.io.opensim.reader import EARTHS_GRAVITY_M_S2
 from kinertia.io.recording import FARTHEST_M, STRONGEST_N
-from kinertia.io.subject.body_files import LONGEST_CM, SHORTEST_CM
 from kinertia.io.subject.person_recordings import FASTEST_M_S
 from kinertia.io.text.number_table import LARGEST_STEP_S
 from kinertia.io.text.trc import RATE_ERROR
@@ -35,12 +32,10 @@ from kinertia.model.stadium_body import GIRTH_OVER_WIDTH
 
 ALL_CHECKS: tuple[Check[Any], ...] = (*STATIC_CHECKS, *MOTION_CHECKS, *PERSON_CHECKS, *ESTIMATE_CHECKS, *RESULT_CHECKS)
 REPORTED_ELSEWHERE: Mapping[str, Mapping[str, Limit]] = {
-    "F122": {"smallest": Limit(PERSON_M[0], "m"), "largest": Limit(PERSON_M[1], "m")},
     "F153": {"misses": Limit(MOMENTS_FIT)},
     "F171": {"farthest": FARTHEST_M},
     "F172": {"strongest": STRONGEST_N},
     "F181": {"fastest": Limit(FASTEST_M_S, "m/s")},
-    "F182": {"shortest": Limit(SHORTEST_CM / 100.0, "m"), "longest": Limit(LONGEST_CM / 100.0, "m")},
     "M173": {"moved": CALIBRATED_M},
     "O411": {"share": MODEL_MASS_SHARE},
     "O413": {"light": Limit(LIGHT_KG, "kg")},
@@ -55,7 +50,6 @@ REPORTED_ELSEWHERE: Mapping[str, Mapping[str, Limit]] = {
     "S404": {"distance": KNOWN_BODY_SD},
     "T103": {"differs": RATE_ERROR},
     "T106": {"step": Limit(LARGEST_STEP_S, "s")},
-    "O104": {"least": Limit(EARTHS_GRAVITY_M_S2[0], "m/s2"), "most": Limit(EARTHS_GRAVITY_M_S2[1], "m/s2")},
     "O311": {"clamped": CLAMPED},
     "O312": {"share": AT_LIMIT, "beyond": BEYOND_RAD},
     "O407": {"moved": MOVED_M},
@@ -91,11 +85,28 @@ def limits_of(code: str) -> Mapping[str, Limit]:
     """
     result: dict[str, Limit] = {}
     declared = [check.limits for check in ALL_CHECKS if code in check.codes]
-    for limits in (*declared, REPORTED_ELSEWHERE.get(code, {})):
+    for limits in (*declared, REPORTED_ELSEWHERE.get(code, {}), _of_readers(code)):
         for name, limit in limits.items():
             if result.setdefault(name, limit) != limit:
                 raise ValueError(f"{code} has two limits {name}: {result[name]:g} and {limit:g}")
     return result
+
+
+def _of_readers(code: str) -> Mapping[str, Limit]:
+    """Return the limits of readers that few people need, and that load slowly."""
+    if code == "F122":
+        from kinertia.io.c3d.reader import PERSON_M
+
+        return {"smallest": Limit(PERSON_M[0], "m"), "largest": Limit(PERSON_M[1], "m")}
+    if code == "F182":
+        from kinertia.io.subject.body_files import LONGEST_CM, SHORTEST_CM
+
+        return {"shortest": Limit(SHORTEST_CM / 100.0, "m"), "longest": Limit(LONGEST_CM / 100.0, "m")}
+    if code == "O104":
+        from kinertia.io.opensim.reader import EARTHS_GRAVITY_M_S2
+
+        return {"least": Limit(EARTHS_GRAVITY_M_S2[0], "m/s2"), "most": Limit(EARTHS_GRAVITY_M_S2[1], "m/s2")}
+    return {}
 
 
 def _rendered(text: str, limits: Mapping[str, Limit]) -> str:

@@ -136,7 +136,7 @@ class FindingView:
     @cached_property
     def rules(self) -> list[Rule]:
         """Rules of all codes on the page, to be explained there."""
-        from kinertia.diagnostics.limits import with_limits  # loads all checks and readers
+        from kinertia.diagnostics.limits import with_limits  # loads all checks
 
         shown_ = [finding for finding in self.findings if finding.status != "ignored"]
         return [with_limits(rule(code)) for code in sorted({finding.code for finding in shown_})]

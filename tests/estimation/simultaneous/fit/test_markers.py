@@ -68,10 +68,8 @@ def test_angles_and_moments_about_fixed_axes_are_less_certain():
     trial = walk(walking_subject(), 0.8, 100.0)
     kinematics = [seen(trial)]
     moved = replace(GAIT27_UNCERTAINTY, moved_m={"torso": 0.03}).with_fixed_axes()
-    before, after = (
-        estimated(trial, kinematics, uncertainty=uncertainty).deviations[0]
-        for uncertainty in (GAIT27_UNCERTAINTY, moved)
-    )
+    fits = [estimated(trial, kinematics, uncertainty=uncertainty) for uncertainty in (GAIT27_UNCERTAINTY, moved)]
+    before, after = (fit.deviations[0] for fit in fits)
     growth = dict(
         zip(trial.skeleton.coordinates, np.nanmedian(after.coordinates / before.coordinates, axis=0), strict=True)
     )
@@ -84,6 +82,9 @@ def test_angles_and_moments_about_fixed_axes_are_less_certain():
         np.testing.assert_array_equal(changed[:, ~about], same[:, ~about])
         assert (changed[:, about] > same[:, about]).mean() > 0.95
     np.testing.assert_array_equal(after.joints, before.joints)
+    of_instruments = [[entry.moved for entry in fit.posterior.calibration if entry.of_instrument] for fit in fits]
+    assert np.max(of_instruments[0]) > 0.0
+    np.testing.assert_allclose(*of_instruments, rtol=1e-9)
 
 
 def test_markers_are_off_by_what_exceeds_their_prior():

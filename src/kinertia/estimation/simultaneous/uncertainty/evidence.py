@@ -35,6 +35,7 @@ from kinertia.estimation.simultaneous.terms.instrument_term import (
     MissingLoads,
 )
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
+from kinertia.estimation.simultaneous.uncertainty.model_errors import fixed_axes
 from kinertia.estimation.simultaneous.uncertainty.moment_derivatives import MomentsOfTrial
 
 _USUAL_SD = 0.02
@@ -236,7 +237,8 @@ def moved_moments(
 ) -> np.ndarray:
     """Compute `InstrumentSupport.moved` (k,) in one trial, from derivatives of its joint moments at fixed motion.
 
-    The derivatives by the delay are averaged over its standard deviation.
+    The derivatives by the delay are averaged over its standard deviation. Axes that may be tilted make moments about
+    them less certain, but the laboratory's errors no smaller: intervals here are without them.
     """
     dynamic, instruments = np.flatnonzero(problem.trials[k].dynamic), problem.layout.errors
     if not len(dynamic):
@@ -248,7 +250,10 @@ def moved_moments(
     by = every.derivatives(motion, frames)
     change = np.abs(by.static[:, _ROOT : len(problem.moving), instruments])
     rows = np.searchsorted(problem.trials[k].curve_frames, frames)
-    result: np.ndarray = (change / (INTERVAL_SD * curves.moments[rows][:, _ROOT:, None])).max(axis=(0, 1))
+    about, of_joints = by.value[:, : len(problem.moving)], by.value[:, len(problem.moving) :]
+    axes = fixed_axes(problem.skeleton, every.virtual.joints, of_joints, about, problem.calibration.fixed_axes)
+    sd = np.sqrt(np.square(curves.moments[rows]) - axes)[:, _ROOT:, None]
+    result: np.ndarray = (change / (INTERVAL_SD * sd)).max(axis=(0, 1))
     return result
 
 
