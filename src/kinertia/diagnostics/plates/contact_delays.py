@@ -46,7 +46,7 @@ RATE_ERROR_OF_FEW, _CERTAIN_OF_FEW = Limit(0.05, usual=(-0.023, 0.023)), 2.5
 """The same of two or three contacts. On eight fault-free walks, and with forces 50 and 100 ms early or late, the delay
 grows by up to 0.023; with a rate that is wrong by 10 % by 0.075 to 0.123."""
 _DELAY_SD_S, _LEAP_S = 0.010, 0.06
-"""A frame or so; and how much a delay cannot change from one contact to the next, unless it grows."""
+"""A frame or so; and how much a delay cannot change from one contact to the next, unless it grows over a few."""
 _CLEARLY_BEST = 0.5
 _LEAST_RATE, _MOST_RATE, _RATE_STEP = 1.08, 2.5, 0.01
 """Range and step of rate factors; smaller errors show in the growing delay of many contacts (`contact_delays`)."""
@@ -255,7 +255,8 @@ def _steps(contacts: Sequence[PlateContact]) -> list[tuple[int, float, float]]:
 
 def _rate_error(time: FloatArray, late: FloatArray) -> tuple[float, float]:
     """Fit the rate error to starts and ends together, with its SD."""
-    most_s = _LEAP_S + _MOST_RATE_ERROR * np.diff(time.mean(axis=1))
+    few = len(time) < _FEWEST_CONTACTS
+    most_s = _LEAP_S + few * _MOST_RATE_ERROR * np.diff(time.mean(axis=1))
     steps = np.flatnonzero(np.abs(np.diff(late.mean(axis=1))) > most_s) + 1
     # a delay of more than half a step is measured from the wrong stance phase
     rows = max(np.split(np.arange(len(time)), steps), key=len)
