@@ -108,13 +108,9 @@ def assert_targets(folder: Path) -> None:
     found = [finding for finding in summary["findings"] if finding["code"] == "R203"]
     named = {(finding["evidence"]["parameter"]["value"], finding["where"]["part"].split()[-1]) for finding in found}
     # both sides of a segment have one finding
-    named_far = Counter(
-        (parameter, name[:-2]) for parameter, name in zip(far["parameter"], far["segment"], strict=True)
-    )
-    expected = {
-        (parameter, name[:-2] if named_far[parameter, name[:-2]] > 1 else name)
-        for parameter, name in zip(far["parameter"], far["segment"], strict=True)
-    }
+    pairs = [(parameter, name, name[:-2]) for parameter, name in zip(far["parameter"], far["segment"], strict=True)]
+    count = Counter((parameter, both) for parameter, _, both in pairs)
+    expected = {(parameter, both if count[parameter, both] > 1 else name) for parameter, name, both in pairs}
     assert named == expected
 
 
