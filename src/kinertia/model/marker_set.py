@@ -56,7 +56,7 @@ _PREFIX_SHARE = 0.9
 """Share of the labels that begin with a person's name: unnamed trajectories and objects have others."""
 _PREFIX_END = re.compile(r"[-_. ](?=.)")
 _COMPUTED_M = 1e-4
-_SIDES = {"r": "right", "l": "left"}
+SIDE_NAMES = {"r": "right", "l": "left"}
 _FOOT = ("heel", "metatarsal")
 _LEGS = ("pelvis", "thigh", "shank", "foot")
 WIDTHS = tuple(f"{name}_{side}" for name in ("knee", "ankle", "elbow") for side in "rl")
@@ -304,7 +304,7 @@ def in_words(name: str) -> str:
     'right knee'
     """
     head, _, side = name.rpartition("_")
-    return f"{_SIDES[side]} {head.replace('_', ' ')}" if side in _SIDES else name
+    return f"{SIDE_NAMES[side]} {head.replace('_', ' ')}" if side in SIDE_NAMES else name
 
 
 @cache

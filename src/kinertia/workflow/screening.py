@@ -30,7 +30,7 @@ from kinertia.estimation.prepared import TotalMass
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity, Where
 from kinertia.io.lab_plates import rotation_of_line
-from kinertia.model.marker_set import WIDTHS, MarkerSet, matches_labels, spellings
+from kinertia.model.marker_set import SIDE_NAMES, WIDTHS, MarkerSet, matches_labels, spellings
 from kinertia.model.static_landmarks import with_alignment_device
 from kinertia.settings import Subject
 from kinertia.trial.data import Recording
@@ -40,7 +40,6 @@ _OF_FORCES = ("P", "T211", "T212")
 """ERRORs that do not concern the markers."""
 _UPRIGHT = 0.9
 """Cosine of 26 degrees between an axis and the line from feet to pelvis."""
-_SIDES = {"r": "right", "l": "left"}
 
 
 @cache
@@ -343,7 +342,7 @@ def with_widths(
         other = next((trial for trial in trials if trial.measurements.get(name, 0.0) > 0.0), None)
         if other is not None:
             widths_m[name] = other.measurements[name]
-            where = Where(file=other.name, part=f"{_SIDES[joint[-1]]} {joint.rpartition('_')[0]}")
+            where = Where(file=other.name, part=f"{SIDE_NAMES[joint[-1]]} {joint.rpartition('_')[0]}")
             borrowed.append(finding("S105", where, width_m=Quantity(widths_m[name], "m")))
     found = (*static.findings, *borrowed)
     return replace(static, measurements=widths_m, findings=found), replace(marker_set, widths=names)

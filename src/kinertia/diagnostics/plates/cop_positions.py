@@ -64,8 +64,8 @@ or pushing off cannot be the reason. On nine fault-free trials they are 36 to 85
 _BEGIN_OF_HEIGHT, _LATE_OF_HEIGHT, _LATE = 0.033, 0.107, 0.85
 _USUAL_ALONG_M = (-0.016, 0.03)
 _EACH_SHARE = 0.5
-"""Displaced plates displace the centre of pressure at the beginning and at push-off alike, so that each must exceed
-this share of the limit. On a fault-free synthetic person, who lands behind the heel, the mean is -35 mm, but that at
+"""Displaced plates move the centre of pressure by as much at the beginning as at push-off: each must exceed this
+share of the limit. On a fault-free synthetic person, who lands behind the heel, the mean is -35 mm, but that at
 push-off only -12 mm."""
 _BACK_M, _FORWARD_M = Limit(-0.026, "m", usual=_USUAL_ALONG_M), Limit(0.042, "m", usual=_USUAL_ALONG_M)
 """Where a twentieth and 85 % of a step's load have acted, the centre of pressure is this share of stature in front of

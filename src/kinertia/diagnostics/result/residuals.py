@@ -38,6 +38,7 @@ from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.model.anatomy import segment_of
 from kinertia.model.coordinate_range import TOLERANCE_DEG, UNKNOWN
 from kinertia.model.imported_model import centre_offsets
+from kinertia.model.marker_set import SIDE_NAMES
 from kinertia.model.skeleton import Skeleton
 from kinertia.model.upper_body import head_markers
 from kinertia.trial.data import FEET
@@ -58,7 +59,6 @@ _DRIFTING = Limit(3.0)
 """Multiple of the usual SD from which a marker drifts, as in `marker_noise`."""
 TORSO_RAD = Limit(0.25, "rad", usual=(np.radians(2.0), np.radians(6.0)))
 """The skin turns the markers about the torso by 2 to 6 degrees; shoulders without a third axis, in a run, by 38."""
-_SIDES = {"r": "right", "l": "left"}
 _ACROSS = "mediolateral"
 _FARTHER_M = Limit(0.008, "m", usual=(-0.007, 0.007))
 _CENTRE_HEIGHT = 0.55
@@ -281,7 +281,7 @@ def corrected_joints(context: ResultContext) -> Iterator[Finding]:
     """
     for side, rotation_rad in context.ready.elbow_rotations_rad.items():
         rotation = Quantity(rotation_rad, "rad")
-        yield finding("M171", Where(part=f"{_SIDES[side]} elbow"), rotation_rad=rotation)
+        yield finding("M171", Where(part=f"{SIDE_NAMES[side]} elbow"), rotation_rad=rotation)
     if (torso_rad := context.ready.torso_rotation_rad) is not None:
         yield finding("M172", Where(part="torso"), rotation_rad=Quantity(torso_rad, "rad", limit=TORSO_RAD))
     yield from _knee_axes(context)
@@ -289,7 +289,7 @@ def corrected_joints(context: ResultContext) -> Iterator[Finding]:
 
 def _knee_axes(context: ResultContext) -> Iterator[Finding]:
     """Report M175: knees whose axis the trials show elsewhere than the static trial, by either of its two angles."""
-    for side, name in _SIDES.items():
+    for side, name in SIDE_NAMES.items():
         angles = [entry for entry in _calibrated(context) if entry.joint == f"knee_{side}" and entry.quantity == AXIS]
         if any(angle.found for angle in angles):
             worst = max(angles, key=lambda angle: abs(angle.value))

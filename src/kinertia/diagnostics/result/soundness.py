@@ -19,6 +19,7 @@ from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Limit, Quantity, Where
 from kinertia.model.anatomy import segment_of
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters, impossible_segments
+from kinertia.model.marker_set import SIDE_NAMES
 
 CONTRADICTION_SD = Limit(3.0)
 """Prior SDs from which on a parameter contradicts what was expected."""
@@ -33,7 +34,6 @@ CONTRADICTING_COM_M = Limit(0.1, "m")
 _ONE_SIDED_SD = Limit(4.0)
 """As in `one_sided`."""
 _ARMS = ("upper_arm", "forearm", "hand")
-_SIDES = {"r": "right", "l": "left"}
 _PARAMETER_WORDS = {
     "mass": "mass",
     "com": "centre of mass",
@@ -116,7 +116,7 @@ def _far_parameters(fit: Fit) -> Iterator[Finding]:
 def _parameter(fit: Fit, row: int, parameter: str) -> Where:
     words = _PARAMETER_WORDS.get(parameter, f"moment of inertia {parameter}")
     name, _, side = fit.estimate.segments[row].rpartition("_")
-    segment = f"{_SIDES[side]} {name}" if name and side in _SIDES else fit.estimate.segments[row]
+    segment = f"{SIDE_NAMES[side]} {name}" if name and side in SIDE_NAMES else fit.estimate.segments[row]
     return Where(part=f"{words} of the {segment.replace('_', ' ')}")
 
 
