@@ -22,7 +22,10 @@ AWAY = Limit(-0.3, usual=(0.2, 1.0))
 MUCH_SMALLER = Limit(0.5)
 _LEAST_WAY, _POINTING, _FEWEST = 0.03, Limit(0.5, usual=(0.72, 0.94)), 10
 
-_CAUSES = ("a reversed axis or channel", "a vertical that is tilted by some degrees, which looks alike in single steps")
+_CAUSES = (
+    "a reversed axis or channel",
+    "a vertical that is tilted by a few degrees, which looks the same in single steps",
+)
 
 
 def forces_of_steps(context: RecordingContext) -> Iterator[Finding]:
