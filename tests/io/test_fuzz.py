@@ -22,8 +22,8 @@ LINUX = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="limits 
 @LINUX
 @pytest.mark.parametrize(
     ("seed", "cases", "commands"),
-    [(1, 120, 8), pytest.param(2, 4_000, 480, marks=pytest.mark.slow)],
-    ids=["some", "four thousand"],
+    [(1, 120, 8), pytest.param(2, 2_000, 240, marks=pytest.mark.slow)],
+    ids=["some", "two thousand"],
 )
 def test_damaged_files(tmp_path, seed, cases, commands):
     command = [sys.executable, "-W", "ignore", fuzz.__file__, tmp_path, seed, 0, cases, commands]

@@ -63,6 +63,23 @@ def test_missing_frames_have_no_weight(basis):
     np.testing.assert_allclose(filled[:, 1], basis.evaluate(basis.fit(q))[0][:, 1], atol=1e-12)
 
 
+@pytest.mark.parametrize("offset", [-9.0, 1000.0])
+def test_the_origin_does_not_matter(basis, offset):
+    """The outermost splines hardly affect any frame, but accelerations there."""
+    q = np.sin(5 * TIME)[:, None]
+    for here, moved in zip(basis.evaluate(basis.fit(q)), basis.evaluate(basis.fit(q + offset)), strict=True):
+        np.testing.assert_allclose(moved - moved[50], here - here[50], atol=1e-9 * abs(offset) / 0.07**2)
+    np.testing.assert_allclose(basis.fit(q + offset) - basis.fit(q), offset, rtol=1e-9)
+
+
+def test_what_no_frame_shows_continues_in_a_straight_line(basis):
+    q = np.tile(2.0 + 3.0 * TIME[:, None], 3)
+    q[30:70, 0] = q[60:, 1] = q[:, 2] = np.nan
+    filled = basis.evaluate(basis.fit(q))[0]
+    np.testing.assert_allclose(filled[:, :2], np.tile(2.0 + 3.0 * TIME[:, None], 2), atol=1e-4)
+    np.testing.assert_array_equal(filled[:, 2], 0.0)
+
+
 def test_last_frame_belongs_to_the_last_interval():
     basis = MotionBasis(np.linspace(0.0, 1.0, 11), 0.1)
     assert basis.first[-1] == basis.size - 6

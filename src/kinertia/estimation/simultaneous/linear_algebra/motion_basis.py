@@ -24,8 +24,10 @@ from kinertia.settings import ForceCutoff
 
 _DEGREE = 5
 _ACTIVE = _DEGREE + 1
-_RIDGE = 1e-8
-"""Keeps the coefficients of splines without frames at zero."""
+_STRAIGHT = 1e-8
+"""Weight of the squared second differences of the coefficients: what frames hardly determine continues its neighbours
+in a straight line, wherever the origin is."""
+_SECOND_DIFFERENCE = (1.0, -2.0, 1.0)
 _ROUNDING = 1e-9
 """Tolerance relative to a knot interval and to a trial: rounding of the times must not add a knot."""
 LADDER_HZ = (10.0, 12.0, 15.0)
@@ -82,11 +84,14 @@ class MotionBasis:
         return [np.einsum("na,nac->nc", values[frames], active) for values in self.values[: 1 + derivatives]]
 
     def fit(self, q: np.ndarray) -> np.ndarray:
-        """Fit coefficients (size, c) to q (n, c) by least squares; NaN rows of a column are left out."""
+        """Fit coefficients (size, c) to q (n, c) by least squares; NaN rows of a column are left out, zero if it has no others."""
         seen = np.isfinite(q)
         filled = np.where(seen, q, 0.0)
         coefficients = np.empty((self.size, q.shape[1]))
         for mask, columns in equal_columns(seen):
+            if mask.sum() < 2:
+                coefficients[:, columns] = filled[:, columns].sum(axis=0)
+                continue
             value = self.values[0] * mask[:, None]
             band = np.zeros((_ACTIVE, self.size))
             for a in range(_ACTIVE):
@@ -95,7 +100,9 @@ class MotionBasis:
             rows = np.arange(0, value.size + 1, _ACTIVE)
             every = csr_array((value.ravel(), self.active.ravel(), rows), (len(value), self.size))
             rhs = every.T @ filled[:, columns]
-            band[0] += _RIDGE
+            for a, first in enumerate(_SECOND_DIFFERENCE):
+                for b, second in enumerate(_SECOND_DIFFERENCE[a:]):
+                    band[b, a : self.size - 2 + a] += _STRAIGHT * first * second
             coefficients[:, columns] = solveh_banded(band, rhs, lower=True)
         return coefficients
 
