@@ -84,7 +84,10 @@ class MotionBasis:
         return [np.einsum("na,nac->nc", values[frames], active) for values in self.values[: 1 + derivatives]]
 
     def fit(self, q: np.ndarray) -> np.ndarray:
-        """Fit coefficients (size, c) to q (n, c) by least squares; NaN rows of a column are left out, zero if it has no others."""
+        """Fit coefficients (size, c) to q (n, c) by least squares; NaN rows of a column are left out.
+
+        A column without any other row has coefficients of zero.
+        """
         seen = np.isfinite(q)
         filled = np.where(seen, q, 0.0)
         coefficients = np.empty((self.size, q.shape[1]))
