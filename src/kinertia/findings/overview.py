@@ -52,10 +52,6 @@ class Overview:
         """Count the open findings of this severity."""
         return sum(finding.severity is severity for finding in self.open)
 
-    def lines(self, *severities: Severity) -> tuple[str, ...]:
-        """Return the open findings of these severities, a line each, the most important first."""
-        return tuple(finding.line() for finding in self.open if finding.severity in severities)
-
     @property
     def failed(self) -> bool:
         """Whether an ERROR is open, or a trial was not used."""

@@ -9,7 +9,6 @@ import pytest
 
 from kinertia.diagnostics.result.suitability import suitability
 from kinertia.errors import FileError
-from kinertia.findings.finding import Severity
 from kinertia.io.output_folder import check_folder
 from kinertia.io.text.sto import read_sto
 from kinertia.report.exports.contents import summary
@@ -68,10 +67,6 @@ def test_fit_json_keeps_its_contract(saved):
     assert [rating["output"] for rating in fit_summary["suitability"]] == [
         rating.output for rating in suitability(fit, fit.findings)
     ]
-    with pytest.warns(DeprecationWarning, match="Fit.overview.table"):
-        assert fit_summary["warnings"] == list(fit.warnings)
-    corrections = [finding.line() for finding in fit.overview.open if finding.severity is Severity.CORRECTED]
-    assert fit_summary["corrections"] == corrections
     assert fit_summary["notes"] == list(fit.notes)
     assert fit_summary["converged"] == fit.converged
     (trial,) = fit_summary["trials"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -31,7 +30,7 @@ from kinertia.estimation.simultaneous.fit import Posterior
 from kinertia.estimation.simultaneous.instruments.instrument_errors import calibration_columns
 from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import Asymmetry, asymmetries, asymmetry_columns
 from kinertia.findings.extensions import report_function
-from kinertia.findings.finding import Finding, Severity
+from kinertia.findings.finding import Finding
 from kinertia.findings.overview import Overview
 from kinertia.io.norms_file import read_norms
 from kinertia.model.anthropometry import SEGMENTS
@@ -91,13 +90,6 @@ class Fit:
     def overview(self) -> Overview:
         """Summary of the findings: verdict, counts, open findings in order of importance."""
         return Overview(self.findings, self.rules, len(self.trials) + len(self.left_out), self.left_out)
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Lines of open WARNINGs and ERRORs; deprecated: use `findings`, or `overview.table`."""
-        note = "Fit.warnings will go with the next version: use Fit.findings or Fit.overview.table"
-        warnings.warn(note, DeprecationWarning, stacklevel=2)
-        return self.overview.lines(Severity.WARNING, Severity.ERROR)
 
     @cached_property
     def bsp(self) -> pd.DataFrame:

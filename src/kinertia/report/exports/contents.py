@@ -17,7 +17,6 @@ from kinertia.estimation.result.cycles import columns_of, peak_columns, phase_co
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.leg_moments import forces_before, forces_used
 from kinertia.estimation.result.trial_fit import JointCurves, TrialFit
-from kinertia.findings.finding import Severity
 from kinertia.io.opensim.writer import edited_osim, osim_text
 from kinertia.io.subject.provenance import Provenance
 from kinertia.io.text.sto import TimeTable
@@ -310,8 +309,6 @@ def summary(fit: Fit) -> dict[str, Any]:
         "trials_left_out": list(fit.left_out),
         "findings": [finding.to_dict() for finding in fit.findings],
         "suitability": [asdict(rating) for rating in suitability(fit, fit.findings, fit.left_out)],
-        "warnings": list(fit.overview.lines(Severity.WARNING, Severity.ERROR)),
-        "corrections": list(fit.overview.lines(Severity.CORRECTED)),
         "notes": list(fit.notes),
     }
 
