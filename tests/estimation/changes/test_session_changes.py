@@ -11,6 +11,7 @@ import kinertia
 from command_line import run
 from kinertia.errors import KinertiaError
 from kinertia.estimation.changes import session_changes as module
+from kinertia.estimation.changes.condition_changes import Condition
 from kinertia.estimation.changes.session_changes import (
     identity_note,
     instrument_doubts,
@@ -20,6 +21,8 @@ from kinertia.estimation.changes.session_changes import (
     why_unjudged,
 )
 from kinertia.estimation.changes.stride_features import _CONTACTS, CONTACT_SD_S, _Strides
+from kinertia.estimation.result import drawn_fit
+from kinertia.estimation.simultaneous.uncertainty.model_errors import CENTRE_SD_M
 from kinertia.findings.finding import Severity, finding
 from kinertia.findings.quantity import Quantity, Where
 from kinertia.model.bsp import BodySegmentParameters
@@ -85,6 +88,33 @@ def test_the_body_cancels_and_markers_do_not(found):
         change.sd_by_source["markers"] for change in found if change.quantity == "moment" and change.joint == "knee"
     ]
     assert min(moments) > 1e-3
+
+
+def test_what_the_body_and_the_rest_make_up_for_is_uncertain_between_sessions():
+    """Within an estimate both compensate; with one body for two sessions, errors of the rest remain."""
+    random = np.random.default_rng(0)
+    body, rest, shared = random.normal(0.0, [[0.05], [0.05], [0.001]], (3, 200))
+    drawn = {"all": body - 0.9 * body + 0.1 * rest, "rest": rest, "instruments": np.zeros(200), "shared": shared}
+    both = [Condition(0.0, 3, {**drawn, "shared": k * shared, "contacts": np.zeros((4,))}, 0.0) for k in (0.0, 1.0)]
+    parts = module._apart(False, "moment lumbar_flexion mid-stance r", *both)
+    assert sum(parts.values()) == pytest.approx(2.0 * np.var(rest, ddof=1) + np.var(shared, ddof=1))
+    assert parts["body"] == pytest.approx(np.var(shared, ddof=1))
+
+
+def test_ankles_are_displaced_to_the_side_between_sessions(fit, sessions, found, monkeypatch):
+    """By CENTRE_SD_M in both, which changes adduction moments by as much times the force along the shank."""
+    monkeypatch.setattr(drawn_fit, "with_drawn_ankles", lambda joints, loads, random: loads)
+    without = {change.names: change.sd_by_source["markers"] for change in compared(*sessions)}
+    more = {change.names: change.sd_by_source["markers"] ** 2 - without[change.names] ** 2 for change in found}
+    stance = ("mid-stance", "late stance")
+    adduction = [
+        np.sqrt(max(variance, 0.0))
+        for (_, joint, component, _, event, unit), variance in more.items()
+        if (joint, component, unit) == ("ankle", "adduction", "N m/kg") and event in stance
+    ]
+    shares = np.array(adduction) / (np.sqrt(2.0) * CENTRE_SD_M * 9.81)  # of a few draws
+    assert 0.5 < shares.min() <= shares.max() < 2.0
+    assert not [names for names, variance in more.items() if names[1] != "ankle" and abs(variance) > 1e-12]
 
 
 def test_the_deviation_is_that_of_two_independent_sessions(fit, found):

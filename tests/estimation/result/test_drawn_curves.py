@@ -27,3 +27,23 @@ def test_curves_of_several_draws(fit, source):
     assert np.isfinite(moments).any()
     assert np.nanmax(np.ptp(moments, axis=3)) > 0.1
     assert (np.nanmax(np.ptp(angles, axis=2)) > 1e-4) == (source == "all")
+
+
+def test_a_displaced_ankle_is_the_same_in_all_curves_of_a_draw(fit):
+    """It changes adduction moments in proportion to the force along the shank, and those of no other joint."""
+    draws, (trial,) = fit.posterior.draws, fit.trials
+    models = [(drawn_joints(fit.skeleton, draws, n), drawn_bodies(fit.estimate, draws, n)) for n in NUMBERS]
+    usual, displaced = (
+        DrawnCurves.of(trial, draws.trials[0], NUMBERS, models, True, ankles) for ankles in (False, True)
+    )
+    time = trial.joint_curves.time[::5]
+    changes = displaced.joint_moment(time) - usual.joint_moment(time)
+    labels = trial.joint_curves.joints["estimate"].joints
+    ankles = [k for k, label in enumerate(labels) if label.startswith("ankle")]
+    others = np.delete(changes, ankles, axis=1)
+    assert not np.nan_to_num(others).any()
+    for k in ankles:
+        up_n = trial.joint_curves.joints["estimate"].forces[::5, k, 1]
+        for place in range(len(NUMBERS)):
+            known = np.isfinite(changes[:, k, 1, place] + up_n)
+            assert abs(np.corrcoef(changes[known, k, 1, place], up_n[known])[0, 1]) > 0.99

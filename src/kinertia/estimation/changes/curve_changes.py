@@ -105,13 +105,10 @@ def paired(before: CurveCondition, after: CurveCondition) -> tuple[np.ndarray, S
 
 def apart(before: CurveCondition, after: CurveCondition) -> tuple[np.ndarray, Sequence[np.ndarray]]:
     """Return the error of a difference of two sessions of one body."""
-    of_all, of_body = (
-        sum(condition.departures[source].var(axis=0, ddof=1) for condition in (before, after))
-        for source in ("all", "body")
-    )
+    rest = sum(condition.departures["rest"].var(axis=0, ddof=1) for condition in (before, after))
     shared = (after.departures["shared"] - before.departures["shared"]).var(axis=0, ddof=1)
     contacts = sum(np.square(condition.departures["contacts"]).sum(axis=0) for condition in (before, after))
-    return np.maximum(of_all - of_body, 0.0) + shared + contacts, (before.departures["all"], after.departures["all"])
+    return rest + shared + contacts, (before.departures["rest"], after.departures["rest"])
 
 
 def curve_changes(before: Rows, after: Rows, measured: Measured) -> Iterator[CurveChange]:

@@ -35,6 +35,7 @@ synthetic people are 2 to 17 ms off, those of 14 recordings (`trial.stances`) up
 _CONTACTS = tuple((side, kind) for side in FEET for kind in ("heel strike", "toe off"))
 _OPPOSITE = {"opposite_toe_off_s": "toe off", "opposite_strike_s": "heel strike"}
 _SAME_TIME_S = 0.003
+_WHOLE = ("all", "rest")
 _FEWER = 2
 """Factor by which draws of parts are fewer than of everything: they mostly divide a variance."""
 Key = tuple[str, str, str, str]
@@ -84,24 +85,26 @@ def stride_features(
     count: int,
     progress: Callable[[float], None] = lambda share: None,
     centre: PosteriorDraws | None = None,
+    anew: bool = False,
 ) -> StrideFeatures:
     """Compute the features of these trials of a fit.
 
     Args:
         fit: by the simultaneous estimate.
         trials: some of its trials.
-        sources: draws of everything ("all") or of a part (`only`).
+        sources: draws of everything ("all"), of everything with one body ("rest"), or of a part (`only`).
         count: number of draws of each, at least two.
         progress: is told the share done.
         centre: its first draw takes the place of the estimate, if given.
+        anew: whether markers are put on anew for what these trials are compared with, by which ankles are drawn, too.
     """
     strides, middle = _Strides.of(trials), _curves_of(trials)
     if centre is not None:
-        middle = _drawn(fit, trials, centre, [0], False)
+        middle = _drawn(fit, trials, centre, [0], False, False)
     (estimate,) = strides.curves(middle, fit.mass_kg)
     shown = np.isfinite(estimate).any(axis=1)
     keys, weights, few = strides.chosen(shown)
-    counts = {source: count if source == "all" else max(2, count // _FEWER) for source in sources}
+    counts = {source: count if source in _WHOLE else max(2, count // _FEWER) for source in sources}
     events: dict[str, np.ndarray] = {}
     curves: dict[str, np.ndarray] = {}
     done = 0
@@ -109,7 +112,8 @@ def stride_features(
         features, rows = [], []
         for some in pieces(counts[source], AT_ONCE):
             numbers = list(range(counts[source]))[some]
-            for drawn in strides.curves(_drawn(fit, trials, draws, numbers, source == "all"), fit.mass_kg):
+            whole = source in _WHOLE
+            for drawn in strides.curves(_drawn(fit, trials, draws, numbers, whole, whole and anew), fit.mass_kg):
                 features.append(_means(drawn[shown], weights))
                 rows.append(drawn[shown][few].astype(np.float32))
             done += len(numbers)
@@ -286,12 +290,13 @@ class _Single:
 
 
 def _drawn(
-    fit: Fit, trials: Sequence[TrialFit], draws: PosteriorDraws, numbers: Sequence[int], knees: bool
+    fit: Fit, trials: Sequence[TrialFit], draws: PosteriorDraws, numbers: Sequence[int], knees: bool, ankles: bool
 ) -> list[_Curves]:
     joints = {draws.coordinate_values[n].tobytes(): n for n in numbers}  # in draws of parts they are all the same
     skeletons = {values: drawn_joints(fit.skeleton, draws, n) for values, n in joints.items()}
     models = [(skeletons[draws.coordinate_values[n].tobytes()], drawn_bodies(fit.estimate, draws, n)) for n in numbers]
-    return [DrawnCurves.of(trial, draws.trials[fit.trials.index(trial)], numbers, models, knees) for trial in trials]
+    of_trials = [(trial, draws.trials[fit.trials.index(trial)]) for trial in trials]
+    return [DrawnCurves.of(*of_trial, numbers, models, knees, ankles) for of_trial in of_trials]
 
 
 def only(draws: PosteriorDraws, body: bool) -> PosteriorDraws:

@@ -16,7 +16,7 @@ from kinertia.estimation.result.curve_source import Gapped, through_angles, thro
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.trial_fit import JointCurves, TrialFit, known_joints
 from kinertia.estimation.simultaneous.instruments.plates import GAIN, corrected_loads
-from kinertia.estimation.simultaneous.uncertainty.model_errors import with_drawn_knees
+from kinertia.estimation.simultaneous.uncertainty.model_errors import with_drawn_ankles, with_drawn_knees
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import PosteriorDraws, TrialDraws
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
@@ -171,9 +171,15 @@ class DrawnCurves:
 
     @classmethod
     def of(
-        cls, trial: TrialFit, draws: TrialDraws, numbers: Sequence[int], models: Sequence[Model], knees: bool
+        cls,
+        trial: TrialFit,
+        draws: TrialDraws,
+        numbers: Sequence[int],
+        models: Sequence[Model],
+        knees: bool,
+        ankles: bool = False,
     ) -> Self:
-        """Make the curves of the draws with these numbers, each with a model; with drawn geometry of knees if wanted.
+        """Make the curves of the draws with these numbers, each with a model; with drawn knees and ankles if wanted.
 
         Of the models' markers no curve depends.
         """
@@ -192,7 +198,9 @@ class DrawnCurves:
             moments_and_forces = joint_loads(skeleton, bsp, motion, foot_loads, joints)
             loads = replace(curves.joints["estimate"], moments=moments_and_forces[0], forces=moments_and_forces[1])
             if knees:
-                loads = with_drawn_knees(skeleton, joints, loads, drawn_knees(number))
+                random = drawn_knees(number)
+                loads = with_drawn_knees(skeleton, joints, loads, random)
+                loads = with_drawn_ankles(joints, loads, random) if ankles else loads
             moments[..., place] = loads.moments
         moments[~known_joints(trial.skeleton, k.trajectory_known)] = np.nan
         return cls(

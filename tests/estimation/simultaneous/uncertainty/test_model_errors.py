@@ -21,6 +21,7 @@ from kinertia.estimation.simultaneous.uncertainty.model_errors import (
     knee_geometry,
     motion_noise,
     placement,
+    with_drawn_ankles,
     with_drawn_knees,
 )
 from kinertia.model.gait27 import LEG_AXIS_TILTS
@@ -170,6 +171,23 @@ def test_back_is_as_certain_as_before(standing):
     drawn = with_drawn_knees(skeleton, joints, moments, random)
     np.testing.assert_array_equal(drawn.moments[:, lumbar], moments.moments[:, lumbar])
     assert np.abs(drawn.moments - moments.moments).max() > 0.1
+
+
+def test_moments_change_as_those_about_the_displaced_ankle(standing):
+    skeleton, joints, moments, wrenches = standing
+    drawn = with_drawn_ankles(joints, moments, SimpleNamespace(normal=lambda mean, sd: mean + sd))
+    pose = skeleton.pose(np.zeros((1, len(skeleton.coordinates))))
+    for k, joint in enumerate(joints):
+        found = drawn.moments[:, k] - moments.moments[:, k]
+        if joint.name != "Ankle":
+            assert not found.any()
+            continue
+        forward, _, right = pose.rotation[0, skeleton.segments.index(joint.child)].T
+        moved = np.cross(-CENTRE_SD_M * right, wrenches[joint][:, :3])
+        adduction = component_signs(joint)[1] * (moved @ forward)
+        np.testing.assert_allclose(found[:, 1], adduction, rtol=1e-9)
+        assert np.abs(adduction).max() > 0.5
+        assert not found[:, 0].any()
 
 
 TIME = np.arange(200) / 100.0

@@ -42,7 +42,7 @@ from kinertia.motion.marker_sums import marker_jacobian
 from kinertia.trial.sampled_data import all_around
 
 CENTRE_SD_M = 0.005
-"""Standard deviation of the knee's centre to the side, chosen here."""
+"""Standard deviation of the knee's centre to the side, chosen here; from day to day also of the ankle's."""
 AXIS_SD_RAD = float(np.radians(4.0))
 """Standard deviation of its axis' direction about the thigh, chosen here."""
 _SHOWN = 1e-6
@@ -164,6 +164,20 @@ def with_drawn_knees(
         displaced = np.array([drawn[joint.side][scale] if joint.side in drawn else 0.0 for joint in joints])
         changes += displaced[:, None, None] * by.reshape(both.shape)
     return replace(loads, moments=loads.moments + signs * changes[:, :, 0], forces=loads.forces + changes[:, :, 1])
+
+
+def with_drawn_ankles(joints: Sequence[BodyJoint], loads: JointMoments, random: np.random.Generator) -> JointMoments:
+    """Return the loads with the centre of each ankle displaced to the side by CENTRE_SD_M, once for all frames.
+
+    Of its moments alone: axes of shanks and feet stay.
+    """
+    changes, signs = np.zeros(loads.moments.shape), np.array([component_signs(joint) for joint in joints])
+    for k, joint in enumerate(joints):
+        if joint.name == "Ankle":
+            forward, up, _ = loads.forces[:, k].T
+            right_m = random.normal(0.0, CENTRE_SD_M)
+            changes[:, k] = signs[k] * np.stack([np.zeros(len(up)), right_m * up, -right_m * forward], axis=1)
+    return replace(loads, moments=loads.moments + changes)
 
 
 def _derivatives(skeleton: Skeleton, joints: Sequence[BodyJoint], loads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
