@@ -6,7 +6,7 @@ ankles then tilt their axes by about 4 degrees. Plates and synchronisation of ea
 third day the person walks otherwise, by a change of known size.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
@@ -53,6 +53,9 @@ STRIDE_DEG = {
 """Standard deviations of postures from walk to walk."""
 CHANGE_DEG = {"hip_adduction": 3.0, "hip_rotation": -8.0, "knee_angle": -6.0, "lumbar_bending": 4.0}
 """What is added to the angles on the third day: positive about the model's axes on both sides."""
+PUT_IN = ("shared", "own", "skin", "instruments", "stride")
+"""What each day has of its own: displacements that markers of a segment share, those of each marker, skin motion,
+errors of plates and synchronisation, and how walks differ."""
 LINEAR_SHARE = 2.0 / 3.0
 """Of the variance of skin motion that follows the joints; the rest moves as rigid clusters."""
 
@@ -104,10 +107,8 @@ class Day:
 def person(seed: int) -> Person:
     """Measure a person on three days."""
     rng = np.random.default_rng(seed)
-    subject = walking_subject()
-    subject = replace(subject, bsp=literature_prior(subject.literature).draw(rng))
-    other = Manner(posture_rad={name: float(np.radians(size)) for name, size in CHANGE_DEG.items()})
-    days = [day(subject, manner, str(k), rng) for k, manner in enumerate((Manner(), Manner(), other), start=1)]
+    subject = drawn_subject(rng)
+    days = [day(subject, manner, str(k), rng) for k, manner in enumerate((Manner(), Manner(), changed()), start=1)]
     pairs = []
     for later in days[1:]:
         before, after = session_features(session(days[0].fit), session(later.fit), draws=DRAWS)
@@ -115,19 +116,38 @@ def person(seed: int) -> Person:
     return Person(seed, pairs[0], pairs[1], tuple(recorded_day.truth for recorded_day in days))
 
 
+def drawn_subject(rng: np.random.Generator) -> SyntheticSubject:
+    """Draw the body of a person."""
+    subject = walking_subject()
+    return replace(subject, bsp=literature_prior(subject.literature).draw(rng))
+
+
+def changed() -> Manner:
+    """Return the manner of the third day."""
+    return Manner(posture_rad={name: float(np.radians(size)) for name, size in CHANGE_DEG.items()})
+
+
 def outcome(change: Change) -> str:
     """Return what a change is of, in words."""
     return " ".join((change.quantity, change.joint, change.component, change.event, change.side))
 
 
-def day(subject: SyntheticSubject, manner: Manner, name: str, rng: np.random.Generator) -> Day:
-    """Measure a person on one day, and fit all walks together."""
-    shift = _marker_shifts(subject, rng)
+def day(
+    subject: SyntheticSubject,
+    manner: Manner,
+    name: str,
+    rng: np.random.Generator,
+    put_in: Collection[str] = PUT_IN,
+) -> Day:
+    """Measure a person on one day with some of PUT_IN, the same whatever else is put in, and fit all walks together."""
+    shift = _marker_shifts(subject, rng, put_in)
     standing = replace(subject.static, markers=camera_noise(_standing(subject, shift), CAMERA_SD_M, rng))
-    manners = [_varied(manner, rng) for _ in range(WALKS)]
+    manners = [_varied(manner, rng, "stride" in put_in) for _ in range(WALKS)]
     walks = [walk(subject, WALK_S, PLATES_HZ, manner=day_manner) for day_manner in manners]
     skins = _Skin.draw(walks, rng)
     instruments = _Instruments.draw(rng)
+    if "instruments" not in put_in:
+        instruments = _Instruments(0.0, np.zeros(2), np.zeros((2, 3)))
     inputs = []
     for number, trial in enumerate(walks):
         read = replace(trial, foot_loads=instruments.read(trial.time, trial.foot_loads))
@@ -136,19 +156,19 @@ def day(subject: SyntheticSubject, manner: Manner, name: str, rng: np.random.Gen
         placed = trial.skeleton.with_positions(trial.skeleton.marker_locals + shift[_moving(subject)])
         q = trial.motion.q[::SAMPLES_PER_FRAME][: len(lab.walk.markers.time)]
         exact = Markers(lab.walk.markers.time, placed.labels, placed.marker_positions(placed.pose(q)))
-        markers = camera_noise(skins.moved(exact, trial, q), CAMERA_SD_M, rng)
+        markers = camera_noise(skins.moved(exact, trial, q) if "skin" in put_in else exact, CAMERA_SD_M, rng)
         inputs.append(TrialInput(replace(lab.walk, name=f"{name} walk {number}", markers=markers), condition=name))
     ready = prepare(Recorded(Subject(name="synthetic", sex="male"), inputs, standing), Settings(joint_axes=True))
     fit = estimate(with_markers_anew(ready))
     return Day(fit, _truth(fit, walk(subject, WALK_S, PLATES_HZ, manner=manner)))
 
 
-def _marker_shifts(subject: SyntheticSubject, rng: np.random.Generator) -> np.ndarray:
+def _marker_shifts(subject: SyntheticSubject, rng: np.random.Generator, put_in: Collection[str]) -> np.ndarray:
     """Draw how far each marker (m, 3) is off, in its segment's frame."""
     skeleton = subject.skeleton
-    of_segment = rng.normal(0.0, SEGMENT_SD_M, (len(skeleton.segments), 3))
+    of_segment = rng.normal(0.0, SEGMENT_SD_M, (len(skeleton.segments), 3)) * ("shared" in put_in)
     rows = [skeleton.segments.index(marker.segment) for marker in skeleton.markers]
-    return rng.normal(0.0, MARKER_SD_M, (len(rows), 3)) + of_segment[rows]
+    return rng.normal(0.0, MARKER_SD_M, (len(rows), 3)) * ("own" in put_in) + of_segment[rows]
 
 
 def _moving(subject: SyntheticSubject) -> list[int]:
@@ -173,14 +193,14 @@ def _standing(subject: SyntheticSubject, shift: np.ndarray) -> Markers:
     return replace(markers, positions=positions)
 
 
-def _varied(manner: Manner, rng: np.random.Generator) -> Manner:
-    """Draw the manner of one walk."""
+def _varied(manner: Manner, rng: np.random.Generator, varies: bool) -> Manner:
+    """Draw the manner of one walk, and return it if walks vary."""
     posture = {name: manner.posture_rad.get(name, 0.0) for name in {*STRIDE_DEG, *manner.posture_rad}}
     drawn = {
         name: value + float(np.radians(rng.normal(0.0, STRIDE_DEG.get(name, 0.0))))
         for name, value in sorted(posture.items())
     }
-    return replace(manner, posture_rad=drawn)
+    return replace(manner, posture_rad=drawn) if varies else manner
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,12 +251,14 @@ class _Instruments:
 
 def _truth(fit: Fit, exact: SyntheticTrial) -> dict[str, float]:
     """Return the true value of each outcome, at the phases of the day's strides."""
-    names = {}
-    for (name, side), values in stride_means([_exactly(trial, exact) for trial in fit.trials], fit.mass_kg).items():
-        quantity, joint, event = name.split(" ", 2)
-        quantity, joint, component = named_outcome(f"{quantity} {joint}")
-        names[" ".join((quantity, joint, component, event, side))] = float(np.mean(values))
-    return names
+    exactly = stride_means([_exactly(trial, exact) for trial in fit.trials], fit.mass_kg)
+    return {in_words(name, side): float(np.mean(values)) for (name, side), values in exactly.items()}
+
+
+def in_words(name: str, side: str) -> str:
+    """Return as `outcome` does what features are of: "moment knee_adduction loading" and a side."""
+    quantity, joint, event = name.split(" ", 2)
+    return " ".join((*named_outcome(f"{quantity} {joint}"), event, side))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
