@@ -53,8 +53,7 @@ def _with_body(fit: Fit, body: BodySegmentParameters) -> dict[str, float]:
 def causes_table(days: Sequence[Errors], people: Sequence[Person], components: Sequence[str]) -> str:
     """Return RMS errors of a day by component and source, beside the deviation that is stated of a day."""
     stated = defaultdict(list)
-    for judged in (one for person in people for one in person.judged(1)):
-        change = judged.change
+    for change in (judged.change for person in people for judged in person.judged(1)):
         stated[f"{change.quantity} {change.joint} {change.component}"].append(change.sd**2 / 2.0)
     squares: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
     for errors in days:

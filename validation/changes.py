@@ -290,10 +290,10 @@ By component, the same:
 A day with a single stride on plates shows no spread: *cannot be judged*, and not counted ({alone} of {pairs_of_days}
 pairs of days).
 
-What errors of a day come from, in {caused} people with other errors: RMS, N m/kg or degrees. *Stated*: the deviation of the
-difference over the square root of 2, of all people. *Shared* and *own*: marker placement, of all markers of a segment
-and of each. A source's error is that of a day with it alone, less that of a day without any (last column). Moments are of
-the true body: what the estimated body makes up for does not cancel between days.
+What errors of a day come from, in {caused} people with other errors: RMS, N m/kg or degrees. *Stated*: the deviation
+of the difference over the square root of 2, of all people. *Shared* and *own*: placement of all markers of a segment
+together, and of each marker. A source's error is that of a day with it alone, less that of a day without any (last
+column). Moments are of the true body: what the estimated body makes up for does not cancel between days.
 
 {causes}
 
@@ -328,15 +328,15 @@ here do not.
 - Hip rotation angles are covered in 90 % with a change. What is stated, 3 degrees of a day, is what the placement of
   each marker makes; skin and shared displacement add 1.6 and 1.2 degrees.
 - On the third day knees hyperextend to 13 to 16 degrees. The estimate expects few to go beyond 10 (SD 5), from which
-  joints count as hypermobile, and pulls them back: angles are too flexed by 0.8 degrees in all of the stride, and covered
-  least. (In three people it was 1.0 degrees in mid-stance, without the limits 0.4.) A person with such knees states
-  `ranges_deg`; these people do not.
+  joints count as hypermobile, and pulls them back: angles are too flexed by 0.8 degrees in all of the stride. (In
+  mid-stance of three people it was 1.0 degrees, without the limits 0.4.) A person with such knees states `ranges_deg`;
+  these people do not.
 - Intervals of ankle, subtalar, lumbar and pelvis angles are longer than the errors are. Nearly all of them is marker
   placement. Errors are 5 mm of each marker, which rotate a segment, and 5 mm of all of its markers, which do not; the
   estimate takes 10 mm of each, which rotate it more.
-- Ankles are displaced to the side by 5 mm in addition to what the estimate allows, as knees are: a displaced malleolus
-  moves the ankle's centre in shank and foot alike, where the estimate takes the markers of both for independent. Before,
-  adduction moments of ankles were covered in 92 and 90 %, with 0.085 in place of {ankle} N m/kg.
+- Ankles are 5 mm less certain to the side than in the estimate, as knees are: displaced malleoli move the ankle's
+  centre in shank and foot alike, where the estimate takes markers of both for independent. Without these 5 mm,
+  adduction moments of ankles were covered in 92 and 90 %, with a deviation of 0.085 N m/kg.
 - The spread of strides is pooled over the components of a joint, whose moments differ in size: rotation moments of
   hips, knees and ankles, the smallest, are covered in 99 to 100 %. Pooled by component they would be covered in 92 to
   96 %, adduction moments of ankles in 92 and 94 %, but lumbar moments in 92 and 90 %, since their long intervals of
