@@ -62,6 +62,19 @@ def test_windows_that_are_too_short_say_nothing(recording_of):
         assert found(walk, 1.02) == []
 
 
+@pytest.mark.parametrize("name", [name for name in ("synthetic", "rajagopal") if name in WALKS])
+def test_velocities_at_the_ends_of_a_recording_say_nothing(recording_of, name):
+    """Of a sound walk cut to 1.1 s, rates seemed to differ by up to 2.9 %."""
+    whole = recording_of(*WALKS[name])
+    start_s, end_s = whole.markers.time[[0, -1]]
+    for start, end in ((0.67, 0.62), (0.69, 0.66), (0.71, 0.62), (0.75, 0.62)):
+        markers = whole.markers.cut(start_s + start, end_s - end)
+        plates = whole.plates
+        here = (plates.time >= markers.time[0]) & (plates.time <= markers.time[-1])
+        cut = replace(plates, time=plates.time[here], force=plates.force[here], moment=plates.moment[here])
+        assert found(replace(whole, markers=markers, plates=cut)) == []
+
+
 TOO_SHORT_AT_TWICE = ("plug-in gait a", "plug-in gait b")
 
 

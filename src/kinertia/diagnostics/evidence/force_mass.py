@@ -1,7 +1,6 @@
 """Weighs a body by forces, before inverse kinematics: on the move, standing, and on each plate.
 
 Over a window the mean vertical force is m (g + dv / T), where dv is the change of the body centre's upward velocity
-from kinertia.findings.quantity import Limit
 from its beginning to its end. The body's centre is marker-based: each segment has its usual share of body mass. No
 model is fitted; the centre's velocity is wrong by about 0.1 m/s, and by less where the body moves at the end as at the
 beginning: over whole strides and steps, and in standing.
@@ -27,8 +26,14 @@ from kinertia.trial.sampled_data import TIME_TOLERANCE_S, nearest_samples, runs,
 CHANGE_SD_M_S = {"standing": 0.01, "whole strides": 0.05, "steps": 0.05, "the whole window": 0.14}
 """Standard deviation of the change of vertical velocity by markers, between both ends: half of it is due to motion of
 arms and trunk that their markers do not show, half to skin. On seven measured trials of a second and more it is 0.001
-to 0.003 m/s where the person stands, over strides and steps 0.01 to 0.02 m/s in walking and 0.02 to 0.07 in running,
-over other windows 0.03 m/s in walking and squatting and up to 0.25 in running."""
+to 0.003 m/s where the person stands, over strides and steps 0.01 to 0.02 m/s in walking and 0.02 to 0.07 in running."""
+_SHARE_OF_VELOCITY = 0.6
+"""The same over any window, as a share of the SD of the vertical velocity, if that is more. Over 60 windows of 0.25 to
+2 s of each of 25 measured trials it is 0.02 to 0.07 m/s in walks and squats, 0.18 to 0.26 m/s in runs and jumps: 0.18
+to 0.6 of the velocity's."""
+_SHORTEST_WEIGHED_S, _FEWEST_COMPLETE = 0.25, 0.15
+"""Nobody is weighed in less. About the mean mass is supported in 0.25 and more of the frames of runs, landings, walks
+and parts of them, in 0.03 where only the end of a step is on a plate."""
 _FAST_HZ, _SLOW_HZ = 8.0, 4.0
 _AROUND_S = 0.25
 """Frames this near the window help to know velocities at its ends."""
@@ -45,12 +50,12 @@ FOREIGN_SHARE, FOREIGN_S = Limit(0.3), Limit(0.15, "s", usual=(0.0, 0.09))
 walks it is beyond 0.3 for no sample, in landings, of which markers smooth the impact, for up to 0.09 s."""
 _WINDOW_S, _STILL_M = 0.2, 0.005
 """A standing person moves by less within this time: in quiet standing 1 to 3 mm."""
-_CHANGE_SD_M_S = 0.01
-"""SD of the change of vertical velocity between both ends (`force_mass.CHANGE_SD_M_S`)."""
 _BETWEEN, _ASIDE_M = (0.15, 0.85), 0.15
 """Range between the feet of the load of both: beyond it, one of them also stands on something else."""
 _CENTRE_HZ = 8.0
-_ALONE_N, _UNLOADED_N, _SHORTEST_S = 50.0, 10.0, 0.2
+_ALONE_N, _UNLOADED_N, _SHORTEST_S, _BESIDE_S = 50.0, 10.0, 0.2, 0.1
+"""Of support by one plate, whose ends must be as far as the last from those of the recording: nearer, the velocity of
+the body's centre is uncertain, and a sound plate seemed to weigh 9 % more than the other."""
 ADULT_KG = Limit(70.0, "kg")
 _ADULT_N = ADULT_KG * GRAVITY_M_S2
 _HEAVIEST_PERCENT = 95.0
@@ -91,6 +96,12 @@ class ForceMass:
     over: str
     time: FloatArray
     supported_kg: FloatArray
+
+    @property
+    def is_borne(self) -> bool:
+        """Whether this mass is on the plates for a while, not only the end of a step."""
+        near = np.abs(self.supported_kg / self.mass_kg - 1.0) < _COMPLETE
+        return bool(near.mean() > _FEWEST_COMPLETE and np.ptp(self.time) >= _SHORTEST_WEIGHED_S)
 
     def unmeasured(self, total_kg: float) -> UnmeasuredSupport | None:
         """Find the longest interval in which part of the weight is on no plate, while at other times all is."""
@@ -136,6 +147,10 @@ def force_mass(segment_of_label: Mapping[str, str], trial: Trial, standing: bool
         return None
     height, force = place[:, 1], loads.force[:, :, 1].sum(axis=1)
     fast = smooth(around.time, height, _FAST_HZ)
+    change_sd = dict(CHANGE_SD_M_S)
+    change_sd["the whole window"] = max(
+        change_sd["the whole window"], _SHARE_OF_VELOCITY * float(np.std(fast(time, 1)))
+    )
     found: list[tuple[float, float, str]] = []
     for over, first, last in _spans(loads, float(time[0]), float(time[-1]), standing):
         here, lasts_s = within(loads.time, first, last), last - first
@@ -143,7 +158,7 @@ def force_mass(segment_of_label: Mapping[str, str], trial: Trial, standing: bool
         specific = GRAVITY_M_S2 + float(velocity[1] - velocity[0]) / lasts_s
         if here.sum() >= MIN_SAMPLES and specific > 0.2 * GRAVITY_M_S2:
             mass_kg = float(force[here].mean()) / specific
-            found.append((mass_kg, mass_kg * CHANGE_SD_M_S[over] / (lasts_s * specific), over))
+            found.append((mass_kg, mass_kg * change_sd[over] / (lasts_s * specific), over))
     if not found:
         return None
     # weight that is on no plate at the ends of the window affects only the mean over the whole window
@@ -202,7 +217,7 @@ def standing_mass(plates: PlateLoads, markers: Markers, feet: FootMarkers) -> St
         lasts_s = end_s - start_s
         if best is None or lasts_s > best.span_s[1] - best.span_s[0]:
             mass_kg = float(total[here, 1].mean()) / GRAVITY_M_S2
-            sd_kg = mass_kg * _CHANGE_SD_M_S / (lasts_s * GRAVITY_M_S2)
+            sd_kg = mass_kg * CHANGE_SD_M_S["standing"] / (lasts_s * GRAVITY_M_S2)
             on = plates.force[here, :, 1].mean(axis=0) > 0.0
             names = tuple(name for name, loaded in zip(plates.names, on, strict=True) if loaded)
             best = StandingMass(mass_kg, sd_kg, (start_s, end_s), names)
@@ -287,7 +302,8 @@ def plate_masses(
         masses_kg = []
         for first, last in runs((vertical > _ALONE_N) & (others < _UNLOADED_N) & measured):
             span = span_s(plates.time, first, last)
-            if span < _SHORTEST_S:
+            beside = min(plates.time[first] - markers.time[0], markers.time[-1] - plates.time[last])
+            if span < _SHORTEST_S or beside < _BESIDE_S:
                 continue
             step = np.diff(plates.time[first : last + 1])
             impulse = float(((vertical[first + 1 : last + 1] + vertical[first:last]) / 2 * step).sum())

@@ -28,6 +28,7 @@ WARNING_SHARE, ERROR_SHARE, AGREED_SHARE = Limit(0.02), Limit(0.10), Limit(0.05)
 several occasions agree that they do."""
 _SAME = 0.04
 """Share by which two plates, or a plate and the stated mass, may differ and still agree: usual are 2 %."""
+_MOSTLY_MISSING = Limit(0.5)
 _REPEATED = 0.005
 """SD, as a share, of a mass by the same plates from one occasion to another."""
 _SAME_PLACE_M = 1e-3
@@ -99,6 +100,7 @@ def stated_mass(context: PersonContext) -> Iterator[Finding]:
     for name, found in apart.items():
         missing, complete = Quantity(found.missing, "1", limit=MISSING), Quantity(found.complete, "1")
         yield finding("P281", Where(trial=name, span_s=found.span_s), missing=missing, complete=complete)
+    yield from _ends_of_steps(known, total)
     whole, standing = _whole(context, apart), [*_standing(context)]
     partly = [_occasion(name, known[name]) for name in apart]
     for occasion in [*_together([*whole, *standing]), *partly]:
@@ -108,6 +110,16 @@ def stated_mass(context: PersonContext) -> Iterator[Finding]:
             witnesses = standing or [other for other in whole if other.trial != occasion.trial]
             for contradiction in _contradiction(context, occasion, total, witnesses):
                 yield contradiction.at(min(contradiction.severity, most))
+
+
+def _ends_of_steps(known: Mapping[str, ForceMass], total: TotalMass) -> Iterator[Finding]:
+    """Report P281 where all the time most of the weight is on no plate: nothing there can be a step."""
+    for name, mass in known.items():
+        missing = 1.0 - mass.mass_kg / total.total_kg
+        if not mass.is_borne and missing > _MOSTLY_MISSING:
+            span = float(mass.time[0]), float(mass.time[-1])
+            shares = Quantity(missing, "1", limit=_MOSTLY_MISSING), Quantity(0.0, "1")
+            yield finding("P281", Where(trial=name, span_s=span), Severity.ERROR, missing=shares[0], complete=shares[1])
 
 
 def weighed_as_stated(context: PersonContext, other_kg: float) -> bool:
@@ -129,7 +141,7 @@ def masses_of_trials(context: PersonContext) -> Iterator[Finding]:
     """Report S306: of two trials whose forces give different masses, the one that static trial, other trials and stated
     mass contradict.
     """
-    known = {trial.name: trial.force_mass for trial in context.trials if trial.force_mass is not None}
+    known = {trial.name: mass for trial in context.trials if (mass := trial.force_mass) is not None and mass.is_borne}
     standing = [occasion.mass_kg for occasion in _standing(context)]
     for (first, first_mass), (other, others) in combinations(known.items(), 2):
         lighter_kg = min(first_mass.mass_kg, others.mass_kg)
@@ -169,7 +181,7 @@ def _whole(context: PersonContext, apart: Container[str]) -> list[_Occasion]:
         for trial in context.trials
         if trial.name not in apart and trial.name not in better
     )
-    return [*by_plates, *(_occasion(name, mass) for name, mass in known if mass is not None)]
+    return [*by_plates, *(_occasion(name, mass) for name, mass in known if mass is not None and mass.is_borne)]
 
 
 def _by_plates(context: PersonContext) -> list[_Occasion]:
