@@ -32,7 +32,7 @@ EVIDENCE = (
     "cohort-speed",
 )
 """Commands that write a page of their name, in the order of `all`; that of cohort-speed reads the one before it."""
-TOOLS = ("command-speed", "leg-moments", "truth-trials", "synthetic-walk-table", "usual-build")
+TOOLS = ("command-speed", "leg-moments", "recording-ends", "truth-trials", "synthetic-walk-table", "usual-build")
 """Commands that print, or write data."""
 
 

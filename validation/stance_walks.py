@@ -12,6 +12,7 @@ import pandas as pd
 from scipy.interpolate import make_interp_spline
 from scipy.signal import butter, filtfilt
 
+from kinertia.estimation.result.trial_fit import TrialFit
 from kinertia.io.text.sto import read_sto, write_sto
 from kinertia.motion.joint_moments import joint_and_side
 from kinertia.workflow.from_files import fit_subject
@@ -85,7 +86,7 @@ def person_errors(seed: int, skin: Path | None) -> pd.DataFrame:
             donor = MeasuredSkin.read(skin) if skin and kind == "measured" else None
             make_trial(folder, seed, Faults(), gait2354(), donor)
         with quietly(Path(temporary) / "opensim.log"):
-            truth = _true_moments(folders["linear"])
+            truth = true_moments(folders["linear"])
             parts, complete = [], {}
             for name, laboratory in LABORATORIES.items():
                 walk = folders.get("measured" if laboratory.measured_skin else "linear")
@@ -98,7 +99,8 @@ def person_errors(seed: int, skin: Path | None) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def _true_moments(walk: Path) -> pd.DataFrame:
+def true_moments(walk: Path) -> pd.DataFrame:
+    """Return the true moments (N m) over time (s) of a truth trial; columns as in `joint_moments.sto`."""
     model = opensim.Model(str(walk / "truth" / "model.osim"))
     q = radians(model, walk / "truth" / "ik.mot")
     motion = Spline(q.index.to_numpy(), q.to_numpy())
@@ -123,16 +125,22 @@ def _errors(walk: Path, seed: int, laboratory: Laboratory, truth: pd.DataFrame) 
         text = _SUBJECT.format(mass_kg=mass_kg, model=Path(os.path.relpath(model, folder)).as_posix())
         subject.write_text(text, encoding="utf-8")
         trial = fit_subject(subject).trials[0]
-        curves = trial.joint_curves
-        assert curves is not None
-        assert curves.moment_sd is not None
-        loads = curves.joints["estimate"]
-        names, index = list(loads.names), pd.Index(curves.time, name="time")
-        values = pd.DataFrame(loads.moments.reshape(len(index), -1), index, names)
-        sd = pd.DataFrame(curves.moment_sd.reshape(len(index), -1), index, names)
-        usual = _usual_moments(walk / "walk.trc", model, mass_kg, forces, curves.time, folder)
-    measured = np.isin(np.round(curves.time, 6), np.round(trial.time, 6))
+        values, sd = estimated_moments(trial)
+        time = values.index.to_numpy()
+        usual = _usual_moments(walk / "walk.trc", model, mass_kg, forces, time, folder)
+    measured = np.isin(np.round(time, 6), np.round(trial.time, 6))
     return compared(values, sd, truth, usual, measured, true_forces)
+
+
+def estimated_moments(trial: TrialFit) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Return estimated moments and their standard deviations (N m) over time (s); columns as in `joint_moments.sto`."""
+    curves = trial.joint_curves
+    assert curves is not None
+    assert curves.moment_sd is not None
+    loads = curves.joints["estimate"]
+    names, index = list(loads.names), pd.Index(curves.time, name="time")
+    values, sd = (samples.reshape(len(index), -1) for samples in (loads.moments, curves.moment_sd))
+    return pd.DataFrame(values, index, names), pd.DataFrame(sd, index, names)
 
 
 def compared(

@@ -10,6 +10,7 @@ from kinertia.errors import MarkerSetError, TrialError
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.motion.kinematics import AROUND_CONTACT_S, _bridged, facing, known_forces, solve_kinematics
+from kinertia.motion.smoothing import interpolate
 from kinertia.trial.data import FootLoads, Markers, Trial
 
 CLEVELAND = read_marker_set("cleveland-clinic")
@@ -228,6 +229,29 @@ def test_a_leg_needs_its_own_load_only(skeleton, trial):
     assert len(solved.time) < 100 < len(solved.trajectory_time) == np.ptp(np.flatnonzero(solved.known_frames)) + 1
     pelvis = columns(skeleton, "pelvis")
     np.testing.assert_array_equal(solved.trajectory_known[:, pelvis].all(axis=1), solved.inside(solved.trajectory_time))
+
+
+def test_joint_loads_are_known_to_the_ends_of_the_recording(skeleton, trial):
+    solved = solve_kinematics(skeleton, trial, 0.0, 5.0)
+    assert solved.window_s == pytest.approx((0.10, 1.90))
+    np.testing.assert_array_equal(solved.trajectory_time, trial.markers.time)
+    known = solved.trajectory_known
+    assert known[:, ~columns(skeleton, "pelvis")].all()
+    np.testing.assert_array_equal(known[:, columns(skeleton, "pelvis")].all(axis=1), solved.inside(trial.markers.time))
+
+
+def test_the_end_of_a_motion_is_smoothed_and_windows_stay(skeleton, trial, motion):
+    """Errors of markers at the ends of a motion make no accelerations there."""
+    solved = solve_kinematics(skeleton, trial, 0.0, 5.0)
+    noise = np.random.default_rng(1).normal(0.0, 0.001, motion.q.shape)
+    smoothed = solved.with_smooth_ends(motion.q + noise, 10.0)
+    np.testing.assert_array_equal(smoothed[solved.frames], (motion.q + noise)[solved.frames])
+    outer = [0, 1, 2, 198, 199, 200]
+    before, after = (
+        np.sqrt(np.square((interpolate(solved.trajectory_time, q)(trial.markers.time, 2) - motion.qdd)[outer]).mean())
+        for q in (motion.q + noise, smoothed)
+    )
+    assert after < before / 3.0
 
 
 def test_a_joint_needs_markers_of_what_is_distal_and_of_what_carries_it(skeleton, trial):

@@ -21,7 +21,7 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.motion.common_cutoff import Cutoff, common_cutoff
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.inverse_kinematics import InverseKinematics, solve_ik
-from kinertia.motion.smoothing import SmoothedSpline, SmoothingError, smooth
+from kinertia.motion.smoothing import SmoothedSpline, SmoothingError, interpolate, smooth
 from kinertia.motion.workload import one_blas_thread
 from kinertia.trial.data import LOAD_THRESHOLD_N, Markers, Trial
 from kinertia.trial.foot_motion import AROUND_LOAD_S
@@ -36,10 +36,15 @@ AROUND_WINDOW_S = AROUND_LOAD_S
 AROUND_CONTACT_S = 0.5
 """Joint moments are reported up to this long before and after a contact with a plate: most of a swing phase."""
 END_PERIODS = 0.5
-"""The window is this share of the cutoff's period away from the ends of the record, where accelerations are poor.
+"""Measured windows are this share of the cutoff's period off the ends of the record, where accelerations are poor.
 
-On the gait2354 walk the residual is 57 N in these frames and 35 N in all others.
+On the gait2354 walk the residual is 57 N in these frames and 35 N in all others. Joint loads are known there, too, with
+longer error bars.
 """
+
+_FRAMES_BESIDE = 20
+"""A natural quintic spline forgets samples farther away: each divides their weight by 2.3."""
+_LEAST_FREEDOM = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +130,22 @@ class Kinematics:
         first, last = min(start - AROUND_WINDOW_S, time[0] - ends_s), max(end + AROUND_WINDOW_S, time[-1] + ends_s)
         return float(first), float(last)
 
+    def with_smooth_ends(self, q: np.ndarray, cutoff_hz: float) -> np.ndarray:
+        """Smooth coordinates (f, c) at `trajectory_time` near the first and the last pose that markers show.
+
+        No marker says how a spline goes on beyond: its accelerations there are mostly noise, and those of a natural
+        smoothing spline of the same bandwidth a third as wrong. Measured windows stay as they are; the farther away
+        from them a frame is, the more it may change.
+        """
+        time, ends = self.trajectory_time, self.spline.time[[0, -1]]
+        inwards = np.abs(time[:, None] - ends).min(axis=1) * self.cutoff_hz / END_PERIODS
+        freedom = np.square(np.maximum(1.0 - inwards, 0.0))
+        result = q.copy()
+        for first, last in runs(freedom > _LEAST_FREEDOM):
+            part = slice(max(first - _FRAMES_BESIDE, 0), last + 1 + _FRAMES_BESIDE)
+            result[part] = _smoothed(time[part], q[part], freedom[part], cutoff_hz)
+        return result
+
     @cached_property
     def intervals(self) -> tuple[slice, ...]:
         """Slices of the w frames, one per measured window."""
@@ -154,6 +175,23 @@ class Kinematics:
     def near_window(self) -> np.ndarray:
         """Mask (k,) of samples of the ground reactions in `span_s`."""
         return within(self.trial.loads.time, *self.span_s)
+
+
+def _smoothed(time: np.ndarray, values: np.ndarray, freedom: np.ndarray, cutoff_hz: float) -> np.ndarray:
+    """Smooth samples (n, c) by a natural quintic spline that passes through those whose freedom (n,) is 0.
+
+    It minimises the sum of squared changes over freedom and p times the integral of its squared third derivative, with
+    the p of `kinertia.motion.smoothing`.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(3)  # exact, since the integrand has degree 4
+    steps, free = np.diff(time)[:, None], freedom > _LEAST_FREEDOM
+    at = (time[:-1, None] + steps * (nodes + 1.0) / 2.0).ravel()
+    third = interpolate(time, np.eye(len(time)))(at, 3) * np.sqrt(steps * weights / 2.0).reshape(-1, 1)
+    by_free, inverse_p = third[:, free], float(steps.mean()) * (2.0 * np.pi * cutoff_hz) ** 6
+    result = values.copy()
+    system = by_free.T @ by_free + np.diag(inverse_p / freedom[free])
+    result[free] -= np.linalg.solve(system, by_free.T @ third @ values)
+    return result
 
 
 def inside(time: np.ndarray, windows_s: Sequence[tuple[float, float]]) -> np.ndarray:
@@ -207,15 +245,12 @@ def solve_kinematics(
         code = "R102" if error.n_visible else "R103"
         raise TrialError.found(trial.name, code, part, frames=Quantity(error.n_visible, "1")) from error
     seen = _bridged(np.isfinite(ik.q), ik.time)
-    seen[
-        np.abs(ik.time - ik.time[shown].mean())
-        > np.ptp(ik.time[shown]) / 2 - END_PERIODS / cutoff.hz + TIME_TOLERANCE_S
-    ] = False
-    whole = np.logical_and.reduce(seen, axis=1)
+    inner = seen & _away_from_ends(ik.time, shown, END_PERIODS / cutoff.hz)[:, None]
+    whole = np.logical_and.reduce(inner, axis=1)
     known, usable = known_forces(skeleton, trial, seen), whole & trial.measured
     complete = _longest(usable) >= FEWEST_FRAMES or not _longest(legs_on_plates(trial)) >= FEWEST_FRAMES
     if not complete:
-        usable = legs_on_plates(trial) & _of_a_leg(skeleton, known)
+        usable = legs_on_plates(trial) & _of_a_leg(skeleton, known_forces(skeleton, trial, inner))
     windows, findings = _long_enough(trial, usable, whole)
     stuck = int((~ik.converged[solved]).sum())
     if stuck:
@@ -223,6 +258,13 @@ def solve_kinematics(
     remarks = [f"{trial.name}: {cutoff.sentence}"] if cutoff.sentence else []
     notes = (*trial.notes, *remarks)
     return Kinematics(trial, turned_deg, ik, spline, cutoff.hz, windows, notes, tuple(findings), known, complete)
+
+
+def _away_from_ends(time: np.ndarray, shown: slice, ends_s: float) -> np.ndarray:
+    """Return the mask (n,) of frames at least `ends_s` within the first and the last of the frames shown."""
+    middle_s, half_s = time[shown].mean(), np.ptp(time[shown]) / 2
+    result: np.ndarray = np.abs(time - middle_s) <= half_s - ends_s + TIME_TOLERANCE_S
+    return result
 
 
 def _of_a_leg(skeleton: Skeleton, known: np.ndarray) -> np.ndarray:

@@ -51,7 +51,18 @@ def test_tasks_are_named_where_there_are_several(fit):
     assert "); turn (right: whole st" in coverage_sentence([walk, turn])
 
 
-def test_without_strides_there_is_nothing(fit):
+def test_a_walk_of_less_than_a_stride_says_what_is_known_of_stance(fit, monkeypatch):
+    monkeypatch.setattr("kinertia.estimation.result.trial_fit.strides_of", lambda *_: ())
+    walk = replace(fit.trials[0])
+    assert walk.strides == ()
+    assert [(leg.word, leg.missing) for leg in walk.coverage] == [("right", ()), ("left", ())]
+    assert coverage_sentence([walk]).startswith("right: whole st")
+    k = walk.kinematics
+    for task in ("landing", "squat", "other"):
+        assert replace(walk, kinematics=replace(k, trial=replace(k.trial, task=task))).coverage == ()
+
+
+def test_without_ground_contact_there_is_nothing(fit):
     (walk,) = fit.trials
     k = walk.kinematics
     unknown = replace(walk, kinematics=replace(k, trial=replace(k.trial, on_ground=None)))

@@ -26,7 +26,7 @@ from kinertia.motion.kinematics import AROUND_CONTACT_S, Kinematics, near_contac
 from kinertia.trial.data import FEET, LOAD_THRESHOLD_N
 from kinertia.trial.sampled_data import nearest_samples, runs, span_s
 from kinertia.trial.stances import LegCoverage, leg_coverage
-from kinertia.trial.trial_input import WITHOUT_STRIDES
+from kinertia.trial.trial_input import GAIT, WITHOUT_STRIDES
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -42,7 +42,7 @@ SHARED = "one plate carries both feet"
 PARTLY = "the foot reaches beyond its plate, or something else loads the plate"
 BESIDE = "the foot stands beside the plates"
 FAR = f"more than {AROUND_CONTACT_S} s from any contact with a plate"
-ENDS = "too near the ends of the recording for accelerations, or left out"
+LEFT_OUT = "left out"
 _SHORTEST_S = 0.03
 """Shorter gaps are not listed."""
 
@@ -262,9 +262,10 @@ class TrialFit:
     def coverage(self) -> tuple[LegCoverage, ...]:
         """Part of stance and stride of the right and the left leg in which all its joint moments are known.
 
-        Empty where the trial has no strides, or it is unknown when the feet are on the ground.
+        Empty where nobody walks, turns or runs, or it is unknown when the feet are on the ground.
         """
-        return leg_coverage(self.kinematics.trial, self.known_legs) if self.strides else ()
+        trial = self.kinematics.trial
+        return leg_coverage(trial, self.known_legs) if trial.task in GAIT or self.strides else ()
 
     @cached_property
     def moment_gaps(self) -> tuple[MomentGap, ...]:
@@ -310,7 +311,7 @@ def _gaps(skeleton: Skeleton, k: Kinematics, known: np.ndarray) -> Iterator[Mome
             FAR: ~near_contacts(k.trial),
         }
         which = np.select([known[:, foot], *reasons.values()], [-1, *range(len(reasons))], len(reasons))[frames]
-        names = [*reasons, ENDS]
+        names = [*reasons, LEFT_OUT]
         for number, name in enumerate(names):
             for first, last in runs(which == number):
                 if span_s(time[frames], first, last) >= _SHORTEST_S:

@@ -183,7 +183,10 @@ def fit_simultaneous(
         skeletons=tuple(calibrated.with_positions(calibrated.marker_locals + moved) for moved in offsets_m),
         posterior=_posterior(result, prior, seen, trials, motions, uncertainty),
         motions=motions,
-        trajectories=tuple(m.q[span] for m, span in zip(result.motions, spans, strict=True)),
+        trajectories=tuple(
+            k.with_smooth_ends(motion.q[span], bandwidth.motion_hz)
+            for motion, span, k, bandwidth in zip(result.motions, spans, trials, bandwidths, strict=True)
+        ),
         deviations=tuple(sd.spread_over(o.curve_frames - span.start, _size(span)) for sd, o, span in curves),
         foot_loads=tuple(loads[frames] for loads, frames in zip(result.foot_loads, inside, strict=True)),
     )

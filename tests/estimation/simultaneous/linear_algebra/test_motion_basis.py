@@ -54,6 +54,19 @@ def test_polynomials_up_to_the_degree_are_met_exactly(basis, degree):
     np.testing.assert_allclose(basis.evaluate(basis.fit(polynomial(at)[:, None]))[0][:, 0], polynomial(at), atol=1e-5)
 
 
+def test_accelerations_of_results_are_constant_at_the_ends(basis):
+    changed = np.flatnonzero((basis.steady_values != basis.values).any(axis=(0, 2)))
+    assert changed.tolist() == [0, 1, 2, 98, 99, 100]
+    np.testing.assert_array_equal(basis.steady_values[:2], basis.values[:2])
+    for ends in ([0, 1, 2, 3], [97, 98, 99, 100]):
+        (constant,) = np.unique(basis.steady_values[2, ends], axis=0)
+        assert constant.tolist() in basis.values[2, [3, 97]].tolist()
+    coefficients = np.random.default_rng(0).normal(size=(basis.size, 2))
+    plain, steady = basis.evaluate(coefficients), basis.evaluate_steady(coefficients, np.arange(101))
+    np.testing.assert_array_equal(steady[:2], plain[:2])
+    np.testing.assert_array_equal(steady[2], plain[2][np.clip(np.arange(101), 3, 97)])
+
+
 def test_missing_frames_have_no_weight(basis):
     q = np.column_stack([np.sin(5 * TIME), np.cos(5 * TIME)])
     holed = q.copy()

@@ -42,7 +42,7 @@ def state(problem, coefficients: np.ndarray, static: np.ndarray, with_impact: bo
     names = problem.calibration.coordinates
     values = dict(zip(names, static[problem.layout[STILL]].tolist(), strict=True))
     dynamic = np.flatnonzero(problem.trials[0].dynamic)
-    motion = Motion(*problem.bases[0].evaluate(coefficients)).cut(dynamic)
+    motion = Motion(*problem.bases[0].evaluate_steady(coefficients)).cut(dynamic)
     reactions, time = problem.loads.reactions(0, static), problem.trials[0].time[dynamic]
     loads = reactions.at(time) + (reactions.uncertain_at(time) if with_impact else 0.0)
     return problem.skeleton.lock(values), problem.model.bsp(static), motion, loads
@@ -99,7 +99,7 @@ def joints(problem, coefficients: np.ndarray, static: np.ndarray, with_impact: b
 def derivatives_at(problem, coefficients: np.ndarray, static: np.ndarray, delay_sd_s: float):
     """The motion at the dynamic frames, and `MomentsOfTrial.derivatives` there."""
     frames = np.flatnonzero(problem.trials[0].dynamic)
-    motion = [part[frames] for part in problem.model.full(problem.bases[0].evaluate(coefficients), static)]
+    motion = [part[frames] for part in problem.model.full(problem.bases[0].evaluate_steady(coefficients), static)]
     reactions = problem.loads.reactions(0, static)
     return motion, MomentsOfTrial(problem, 0, static, reactions, delay_sd_s).derivatives(motion, frames)
 
@@ -139,7 +139,7 @@ def dense_derivatives(
         through = np.zeros((d, wide, size, c))
         for row, t in enumerate(frames):
             for a, spline in enumerate(basis.active[t]):
-                parts = zip(basis.values[:, t, a] * shares, moved, strict=True)
+                parts = zip(basis.steady_values[:, t, a] * shares, moved, strict=True)
                 through[row, :, spline] = sum(derivative * part[row] for derivative, part in parts)
         rest = np.zeros((d, wide, problem.layout.size - fixed.shape[2]))
         result[name] = np.concatenate([through.reshape(d, wide, size * c), fixed, rest], axis=2)

@@ -11,6 +11,7 @@ depend on it.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal, Self
 
 import numpy as np
@@ -30,6 +31,8 @@ in a straight line, wherever the origin is."""
 _SECOND_DIFFERENCE = (1.0, -2.0, 1.0)
 _ROUNDING = 1e-9
 """Tolerance relative to a knot interval and to a trial: rounding of the times must not add a knot."""
+_STEADY_INTERVALS = 0.5
+"""In four people's walks by OpenSim, cut at both ends, 97 % of moments this near the ends are within 95 % intervals."""
 LADDER_HZ = (10.0, 12.0, 15.0)
 LEFT_SHARE_OF_WEIGHT = 0.005
 """Largest RMS residual of the ground reactions that the motion may leave, as a share of their mean vertical force."""
@@ -75,6 +78,20 @@ class MotionBasis:
         self.values = np.stack([shape.derivative(d)(at) / step**d if d else shape(at) for d in range(3)])
         self.active = self.first[:, None] + np.arange(_ACTIVE)
         self.knots = knots
+        place = (time - begin) / step
+        self._steady = np.arange(len(time))
+        self._steady[place - place[0] < _STEADY_INTERVALS] = np.flatnonzero(place - place[0] < _STEADY_INTERVALS)[-1]
+        self._steady[place[-1] - place < _STEADY_INTERVALS] = np.flatnonzero(place[-1] - place < _STEADY_INTERVALS)[0]
+
+    @cached_property
+    def steady_values(self) -> np.ndarray:
+        """`values`, but with the accelerations constant in the last half of a knot interval at either end.
+
+        So are those of the motion in results, nearly (`Kinematics.with_smooth_ends`). A knot there ends the constancy.
+        """
+        result, alike = self.values.copy(), self.first[self._steady] == self.first
+        result[2, alike] = self.values[2, self._steady[alike]]
+        return result
 
     def evaluate(
         self, coefficients: np.ndarray, frames: slice | np.ndarray = slice(None), derivatives: int = 2
@@ -82,6 +99,11 @@ class MotionBasis:
         """Evaluate coordinates and their first derivatives, each (n, c), from coefficients (size, c)."""
         active = coefficients[self.active[frames]]
         return [np.einsum("na,nac->nc", values[frames], active) for values in self.values[: 1 + derivatives]]
+
+    def evaluate_steady(self, coefficients: np.ndarray, frames: slice | np.ndarray = slice(None)) -> list[np.ndarray]:
+        """Evaluate as `evaluate`, with the accelerations constant in the last half of a knot interval at either end."""
+        accelerations = self.evaluate(coefficients, self._steady[frames])[2]
+        return [*self.evaluate(coefficients, frames, 1), accelerations]
 
     def fit(self, q: np.ndarray) -> np.ndarray:
         """Fit coefficients (size, c) to q (n, c) by least squares; NaN rows of a column are left out.

@@ -182,10 +182,10 @@ class _Curves:
     def _write(self, spread: MotionSpread, root: np.ndarray, rows: slice) -> None:
         moments, problem, chosen = self.moments, self.moments.problem, self.frames[rows]
         basis, variance = problem.bases[moments.k], self.variance
-        motion = problem.model.full(basis.evaluate(self.coefficients, chosen), moments.static)
+        motion = problem.model.full(basis.evaluate_steady(self.coefficients, chosen), moments.static)
         every, c = moments.derivatives(motion, chosen), len(problem.moving)
         self.uncertain[rows], self.speed[rows] = every.uncertain, motion[1][:, problem.moving]
-        by, values, in_root = every.rows(slice(0, c)), basis.values[:, chosen], problem.layout.in_root
+        by, values, in_root = every.rows(slice(0, c)), basis.steady_values[:, chosen], problem.layout.in_root
         known = root[in_root, : root.shape[1] - len(root) + in_root.stop]
         seen = _Seen(by, self.speed[rows], basis.first[chosen], values, self.shares, self.grown[rows, :c])
         _write_variances(spread, seen, known, variance, rows)

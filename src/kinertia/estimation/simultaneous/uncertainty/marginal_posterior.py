@@ -120,7 +120,7 @@ def _curves(
     frames: np.ndarray,
 ) -> tuple[np.ndarray, ...]:
     """Return coordinates, moments, powers, ground reactions and loads of joints at these frames of trial k."""
-    motion = Motion(*problem.model.full(problem.bases[k].evaluate(coefficients, frames), static))
+    motion = Motion(*problem.model.full(problem.bases[k].evaluate_steady(coefficients, frames), static))
     loads = reactions.at(problem.trials[k].time[frames])
     skeleton, bsp = problem.model.placed(static), problem.model.bsp(static)
     moments = inverse_dynamics(skeleton, bsp, motion, loads)[:, problem.moving]
