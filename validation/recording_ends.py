@@ -1,4 +1,4 @@
-"""Compare joint moments near the ends of recordings with the truth."""
+"""Compare moments at ends of recordings to the truth."""
 
 import tempfile
 from collections.abc import Sequence

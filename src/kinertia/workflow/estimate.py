@@ -14,7 +14,7 @@ from kinertia.estimation.free_moment_sign import Signed, with_likelier_sign
 from kinertia.estimation.prepared import Prepared, Progress
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.result.fit import Fit
-from kinertia.estimation.result.trial_fit import JointCurves, TrialFit
+from kinertia.estimation.result.trial_fit import JointCurves, TrialFit, known_with_forces
 from kinertia.estimation.simultaneous.fit import Posterior, SimultaneousFit, fit_simultaneous
 from kinertia.estimation.simultaneous.instruments.instrument_errors import GAIN, INTERVAL_SD, CalibrationEntry
 from kinertia.estimation.simultaneous.instruments.priors import ModelUncertainty
@@ -303,7 +303,8 @@ def _joint_curves(
         "literature": (before, literature, smoothed, after.before),
         "estimate": (after.skeleton, bsp, trajectory, after.reactions),
     }
-    return JointCurves.of(k, trajectory, stages, after.deviations)
+    known = known_with_forces(after.skeleton, k, after.reactions)
+    return JointCurves.of(k, trajectory, stages, after.deviations, known)
 
 
 def _by_windows(k: Kinematics, motion: Motion) -> Motion:

@@ -1,9 +1,12 @@
 """Joint loads of fits, wherever they are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from kinertia.estimation.result.drawn_fit import drawn_fit, kept_draws
+from kinertia.estimation.result.trial_fit import known_with_forces
 from kinertia.estimation.simultaneous.uncertainty.model_errors import CENTRE_SD_M
 from kinertia.io.text.sto import read_sto
 from kinertia.motion.joint_moments import body_joints
@@ -96,3 +99,19 @@ def test_draws_spread_as_the_error_bars_say(fit_of, walk):
     ratio = np.sqrt(apart / reported)
     assert np.median(ratio) == pytest.approx(1.0, abs=0.1 + 1.0 / np.sqrt(2.0 * count))
     np.testing.assert_allclose(ratio, 1.0, atol=0.3)
+
+
+def test_legs_are_known_as_far_as_forces_reach(result):
+    """Forces that are found to be late end before the markers do; trunk and arms need none, and windows stay."""
+    _, trial = result
+    k, names = trial.kinematics, trial.skeleton.coordinates
+    time, before, inside = k.trajectory_time, k.trajectory_known, k.inside(k.trajectory_time)
+    of_leg = np.array([name.startswith(("hip", "knee", "ankle", "subtalar", "pelvis")) for name in names])
+    legs = before[:, of_leg].any(axis=1) & ~inside
+    last_s = time[np.flatnonzero(legs)[-1]]
+    for late_s, reaches in ((0.0049, True), (0.0051, False)):
+        forces = replace(trial.reactions, time=np.array([time[0], last_s - late_s]))
+        known = known_with_forces(trial.skeleton, k, forces)
+        expected = before & (~of_leg | inside[:, None] | (time <= last_s - (0.0 if reaches else 1e-6))[:, None])
+        np.testing.assert_array_equal(known, expected)
+        assert (known != before).any() != reaches

@@ -16,6 +16,7 @@ from kinertia.estimation.result.curve_source import Gapped, through_angles, thro
 from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.trial_fit import JointCurves, TrialFit, known_joints
 from kinertia.estimation.simultaneous.instruments.plates import GAIN, corrected_loads
+from kinertia.estimation.simultaneous.linear_algebra.motion_basis import STEADY_INTERVALS
 from kinertia.estimation.simultaneous.uncertainty.model_errors import with_drawn_ankles, with_drawn_knees
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import PosteriorDraws, TrialDraws
 from kinertia.model.bsp import BodySegmentParameters
@@ -23,6 +24,7 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, inverse_dynamics
 from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.joint_moments import body_joints, joint_loads
+from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.smoothing import interpolate
 from kinertia.motion.workload import pieces
 
@@ -131,11 +133,23 @@ def drawn_motions(trial: TrialFit, draws: TrialDraws, numbers: Sequence[int]) ->
     time, trajectory = (k.time, trial.motion.q) if trial.trajectory is None else (k.trajectory_time, trial.trajectory)
     departures = draws.coefficients[numbers]
     some = departures if departures.any() else departures[:1]  # that are all the same
-    moved = BSpline(draws.knots, some.transpose(1, 0, 2).astype(float), _DEGREE)(time)
+    moved = _steady_at_ends(BSpline(draws.knots, some.transpose(1, 0, 2).astype(float), _DEGREE), time, k)
     spline = interpolate(time, trajectory[:, None] + moved)
     orders = [np.ascontiguousarray(spline(time, order).swapaxes(0, 1)) for order in range(3)]
     motions = [Motion(*orders_of_draw) for orders_of_draw in zip(*orders, strict=True)]
     return time, motions if len(some) == len(numbers) else motions * len(numbers)
+
+
+def _steady_at_ends(spline: BSpline, time: np.ndarray, k: Kinematics) -> np.ndarray:
+    """Evaluate a spline at times (f,), with the accelerations constant at the ends of the record as in error bars."""
+    result: np.ndarray = spline(time)
+    for end, innermost in zip(k.spline.time[[0, -1]], (-1, 0), strict=True):
+        near = np.flatnonzero(np.abs(time - end) < STEADY_INTERVALS * (spline.t[1] - spline.t[0]))
+        if near.size:
+            at = time[near[innermost]]
+            after = (time[near] - at)[:, None, None]
+            result[near] = spline(at) + after * spline(at, 1) + 0.5 * after**2 * spline(at, 2)
+    return result
 
 
 def drawn_knees(number: int) -> np.random.Generator:

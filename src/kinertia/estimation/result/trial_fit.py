@@ -43,6 +43,8 @@ PARTLY = "the foot reaches beyond its plate, or something else loads the plate"
 BESIDE = "the foot stands beside the plates"
 FAR = f"more than {AROUND_CONTACT_S} s from any contact with a plate"
 LEFT_OUT = "left out"
+_EXTRAPOLATED_S = 0.005
+"""Forces are continued so far beyond their first and last sample."""
 _SHORTEST_S = 0.03
 """Shorter gaps are not listed."""
 
@@ -101,6 +103,7 @@ class JointCurves:
         motion: Motion,
         stages: Mapping[str, Stage],
         deviations: CurveDeviations | None,
+        known: np.ndarray,
     ) -> Self:
         """Compute the loads of every stage.
 
@@ -109,8 +112,9 @@ class JointCurves:
             motion: estimated, at the frames of `trajectory_time`.
             stages: skeleton, parameters, motion at these frames and ground reactions of each.
             deviations: standard deviations at these frames.
+            known: (f, c) frames in which the generalised force of each coordinate is known.
         """
-        time, known = kinematics.trajectory_time, kinematics.trajectory_known
+        time = kinematics.trajectory_time
         forces, joints = {}, {}
         for name, (skeleton, bsp, moved, reactions) in stages.items():
             loads, known_loads = reactions.at(time), known_joints(skeleton, known)
@@ -125,13 +129,27 @@ class JointCurves:
     def drawn(self, kinematics: Kinematics, stage: Stage, random: np.random.Generator | None) -> JointCurves:
         """Return the curves of a draw of the estimate, with knee geometry drawn if `random` is given, without standard
         deviations."""
-        drawn_curves = type(self).of(kinematics, stage[2], {"estimate": stage}, None)
+        drawn_curves = type(self).of(kinematics, stage[2], {"estimate": stage}, None, self.known)
         loads = drawn_curves.joints["estimate"]
         if random is not None:
             loads = with_drawn_knees(stage[0], body_joints(stage[0]), loads, random)
         return replace(
             drawn_curves, forces={**self.forces, **drawn_curves.forces}, joints={**self.joints, "estimate": loads}
         )
+
+
+def known_with_forces(skeleton: Skeleton, kinematics: Kinematics, reactions: GroundReactions) -> np.ndarray:
+    """Return `Kinematics.trajectory_known` without legs where forces, corrected for their delay, were not recorded.
+
+    Measured windows keep all frames.
+    """
+    time, known = kinematics.trajectory_time, kinematics.trajectory_known.copy()
+    beyond = np.maximum(reactions.time[0] - time, time - reactions.time[-1]) > _EXTRAPOLATED_S
+    rows = beyond & ~kinematics.inside(time)
+    for foot in skeleton.feet:
+        axes = np.unique(skeleton.map.owner[skeleton.support[skeleton.segments.index(foot)]])
+        known[np.ix_(rows, axes)] = False
+    return known
 
 
 def known_joints(skeleton: Skeleton, known: np.ndarray) -> np.ndarray:
