@@ -56,7 +56,8 @@ def test_a_walk_of_less_than_a_stride_says_what_is_known_of_stance(fit, monkeypa
     walk = replace(fit.trials[0])
     assert walk.strides == ()
     assert [(leg.word, leg.missing) for leg in walk.coverage] == [("right", ()), ("left", ())]
-    assert coverage_sentence([walk]).startswith("right: whole st")
+    assert coverage_sentence([walk]) == "right: whole stance; left: whole stance"
+    assert [leg.stride for leg in walk.coverage] == [None, None]
     k = walk.kinematics
     for task in ("landing", "squat", "other"):
         assert replace(walk, kinematics=replace(k, trial=replace(k.trial, task=task))).coverage == ()

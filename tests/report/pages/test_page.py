@@ -14,6 +14,7 @@ import pytest
 from command_line import run
 from found import FAULT_FREE, UNEXPLAINED, UNUSABLE
 from kinertia.diagnostics.result.suitability import Suitability
+from kinertia.estimation.result.leg_moments import coverage_sentence
 from kinertia.findings.finding import Severity, finding
 from kinertia.io.subject.provenance import provenance_of
 from kinertia.io.subject.reader import read_subject
@@ -316,6 +317,16 @@ def test_the_first_screen_of_fault_free_data_has_nothing_to_do(fit):
     assert '<ol class="steps' not in page
     assert page.count('<article class="finding') == 0
     assert re.findall(r'<p class="headline (\w+)', page) == ["info"]
+
+
+def test_without_a_stride_the_verdict_says_what_is_known_of_stance(fit, page, monkeypatch):
+    known = coverage_sentence(fit.trials)
+    assert Elements(page).text.count(known) == 1 + 1  # with the strides, and in the reason of the table of outputs
+    monkeypatch.setattr("kinertia.estimation.result.trial_fit.strides_of", lambda *_: ())
+    short = replace(fit, trials=tuple(replace(trial) for trial in fit.trials))
+    known = coverage_sentence(short.trials)
+    assert known.startswith("right: ")
+    assert Elements(render(short)).text.count(known) == 1 + 1
 
 
 def test_two_level_report_says_that_it_has_no_error_bars(two_level):

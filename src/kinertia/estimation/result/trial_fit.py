@@ -187,8 +187,8 @@ class TrialFit:
         kinematics: markers, coordinates and ground reactions before estimation.
         skeleton: with this trial's marker positions (`displacement`).
         motion: estimated coordinates (rad, m), and their derivatives as OpenSim's tools compute them from
-            `kinematics.mot`, by natural quintic splines through the frames. They differ from the estimate's own in the
-            first and last frames only.
+            `kinematics.mot`, by natural quintic splines through the frames. They differ from the estimate's own
+            near the ends of the record only, where `trajectory` is smoothed.
         trajectory: (f, c) coordinates of `kinematics.trajectory_time`: all frames in which any joint's load is known,
             and those between; None after two-level, which has none there.
         motion_hz: bandwidth of the motion.
@@ -282,8 +282,9 @@ class TrialFit:
 
         Empty where nobody walks, turns or runs, or it is unknown when the feet are on the ground.
         """
-        trial = self.kinematics.trial
-        return leg_coverage(trial, self.known_legs) if trial.task in GAIT or self.strides else ()
+        trial, sides = self.kinematics.trial, {stride.side for stride in self.strides}
+        legs = leg_coverage(trial, self.known_legs) if trial.task in GAIT or sides else ()
+        return tuple(leg if leg.side in sides else replace(leg, stride=None) for leg in legs)
 
     @cached_property
     def moment_gaps(self) -> tuple[MomentGap, ...]:

@@ -90,8 +90,9 @@ def render(
     shown = fit.trials[:MOST_TRIALS]
     gaps, covered = gaps_sentence(shown), coverage_sentence(fit.trials)
     outputs = suitability(fit, fit.findings, fit.left_out)
-    rated, said = without_repetition(purposes(outputs, impossible(fit)), covered), words(fit)
     phases, cycle, more_cycles = cycles_view(fit, norms, profiles)
+    # where there are strides their section says it
+    rated, said = without_repetition(purposes(outputs, impossible(fit)), covered if cycle else ""), words(fit)
     return rendered(
         f"{template}.html.j2",
         title=f"{fit.subject.name}: gait report",
