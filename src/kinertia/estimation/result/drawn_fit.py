@@ -17,7 +17,7 @@ from kinertia.estimation.result.fit import Fit
 from kinertia.estimation.result.trial_fit import JointCurves, TrialFit, known_joints
 from kinertia.estimation.simultaneous.instruments.plates import GAIN, corrected_loads
 from kinertia.estimation.simultaneous.linear_algebra.motion_basis import STEADY_INTERVALS
-from kinertia.estimation.simultaneous.uncertainty.model_errors import with_drawn_ankles, with_drawn_knees
+from kinertia.estimation.simultaneous.uncertainty.model_errors import END_GROWTH, with_drawn_ankles, with_drawn_knees
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import PosteriorDraws, TrialDraws
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
@@ -141,14 +141,16 @@ def drawn_motions(trial: TrialFit, draws: TrialDraws, numbers: Sequence[int]) ->
 
 
 def _steady_at_ends(spline: BSpline, time: np.ndarray, k: Kinematics) -> np.ndarray:
-    """Evaluate a spline at times (f,), with the accelerations constant at the ends of the record as in error bars."""
+    """Evaluate a spline at times (f,), with steady accelerations at the ends of the record, as in error bars."""
     result: np.ndarray = spline(time)
+    steady_s = STEADY_INTERVALS * (spline.t[1] - spline.t[0])
     for end, innermost in zip(k.spline.time[[0, -1]], (-1, 0), strict=True):
-        near = np.flatnonzero(np.abs(time - end) < STEADY_INTERVALS * (spline.t[1] - spline.t[0]))
+        near = np.flatnonzero(np.abs(time - end) < steady_s)
         if near.size:
             at = time[near[innermost]]
             after = (time[near] - at)[:, None, None]
-            result[near] = spline(at) + after * spline(at, 1) + 0.5 * after**2 * spline(at, 2)
+            growing = 1.0 + END_GROWTH * np.abs(after) / (3.0 * steady_s)
+            result[near] = spline(at) + after * spline(at, 1) + 0.5 * after**2 * growing * spline(at, 2)
     return result
 
 
@@ -216,7 +218,7 @@ class DrawnCurves:
                 loads = with_drawn_knees(skeleton, joints, loads, random)
                 loads = with_drawn_ankles(joints, loads, random) if ankles else loads
             moments[..., place] = loads.moments
-        moments[~known_joints(trial.skeleton, k.trajectory_known)] = np.nan
+        moments[~known_joints(trial.skeleton, curves.known)] = np.nan
         return cls(
             Gapped.of(time, np.where(_shown(curves)[..., None], angles, np.nan), through),
             Gapped.of(time, moments, through_loads),

@@ -14,7 +14,7 @@ from kinertia.estimation.simultaneous.solver import _roots_in_trials, _uncertain
 from kinertia.estimation.simultaneous.terms.instrument_term import CLOCK, PLATES, ZEROS
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import curve_deviations
 from kinertia.estimation.simultaneous.uncertainty.marginal_posterior import OfPhases
-from kinertia.estimation.simultaneous.uncertainty.model_errors import block_growth, knee_geometry
+from kinertia.estimation.simultaneous.uncertainty.model_errors import block_growth, end_growth, knee_geometry
 from kinertia.estimation.simultaneous.uncertainty.moment_derivatives import MomentsOfTrial
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import Mode
 from kinertia.motion.dynamics import Motion, inverse_dynamics
@@ -240,9 +240,11 @@ def test_unknowns_that_are_left_out_of_the_vector_count_in_all_curves(estimate):
 
 
 def grown(problem, static: np.ndarray) -> np.ndarray:
-    """(d, r, 1) by how much more the markers' errors make of moments where skin moves unseen."""
-    time = problem.trials[0].time[problem.trials[0].dynamic]
-    return block_growth(problem, 0, static, time, body_joints(problem.skeleton))[..., None]
+    """(d, r, 1) by how much more the markers' errors make of moments where skin moves unseen, and at the ends."""
+    every = problem.trials[0].time
+    time = every[problem.trials[0].dynamic]
+    larger = block_growth(problem, 0, static, time, body_joints(problem.skeleton))
+    return (larger * end_growth(problem.bases[0], every, time)[:, None])[..., None]
 
 
 def speeds(problem, coefficients: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from kinertia.estimation.prior import literature_prior
+from kinertia.estimation.simultaneous.linear_algebra.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.markers.marker_errors import ErrorProcess
 from kinertia.estimation.simultaneous.observation import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.search.problem import MapProblem
@@ -14,9 +15,11 @@ from kinertia.estimation.simultaneous.uncertainty import model_errors as module
 from kinertia.estimation.simultaneous.uncertainty.model_errors import (
     AXIS_SD_RAD,
     CENTRE_SD_M,
+    END_GROWTH,
     GROWTH,
     LASTS_S,
     block_growth,
+    end_growth,
     fixed_axes,
     knee_geometry,
     motion_noise,
@@ -363,3 +366,11 @@ def test_gaps_and_parts_change_little(trial, expected, monkeypatch):
 
 def test_nothing_seen_is_as_expected(trial, expected):
     assert found(trial, np.nan * expected).tolist() == [1.0, 1.0, 1.0]
+
+
+def test_moments_are_less_certain_at_the_ends_of_the_motion():
+    time = 3.0 + np.arange(101) / 100.0
+    growth = end_growth(MotionBasis(time, 0.1), time, time)
+    np.testing.assert_allclose(growth[[0, 1, 4, 5, 50]], 1.0 + END_GROWTH * np.array([1.0, 0.8, 0.2, 0.0, 0.0]))
+    np.testing.assert_allclose(growth, growth[::-1])
+    assert (growth[6:-6] == 1.0).all()

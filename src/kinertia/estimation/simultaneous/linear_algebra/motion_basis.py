@@ -31,7 +31,7 @@ in a straight line, wherever the origin is."""
 _SECOND_DIFFERENCE = (1.0, -2.0, 1.0)
 _ROUNDING = 1e-9
 """Tolerance relative to a knot interval and to a trial: rounding of the times must not add a knot."""
-STEADY_INTERVALS = 0.35
+STEADY_INTERVALS = 0.5
 """In four people's walks by OpenSim, cut at both ends, 97 % of moments this near the ends are within 95 % intervals."""
 LADDER_HZ = (10.0, 12.0, 15.0)
 LEFT_SHARE_OF_WEIGHT = 0.005

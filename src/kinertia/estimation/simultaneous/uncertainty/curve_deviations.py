@@ -23,7 +23,12 @@ from kinertia.estimation.simultaneous.linear_algebra.elimination import Branch, 
 from kinertia.estimation.simultaneous.linear_algebra.normal_equations import write_by_splines
 from kinertia.estimation.simultaneous.search.problem import MapProblem
 from kinertia.estimation.simultaneous.uncertainty.curve_variances import EndSpread, MotionSpread, write_variances
-from kinertia.estimation.simultaneous.uncertainty.model_errors import block_growth, fixed_axes, knee_geometry
+from kinertia.estimation.simultaneous.uncertainty.model_errors import (
+    block_growth,
+    end_growth,
+    fixed_axes,
+    knee_geometry,
+)
 from kinertia.estimation.simultaneous.uncertainty.moment_derivatives import MomentDerivatives, MomentsOfTrial
 from kinertia.motion.workload import side_by_side
 from kinertia.trial.sampled_data import even_mean
@@ -111,7 +116,7 @@ def curve_deviations(
             equations, which come first, have only as many nonzero columns as there are such unknowns.
         noise: (3,) `motion_noise`, of errors that do not recur.
     """
-    basis, frames = problem.bases[k], problem.trials[k].curve_frames
+    basis, frames, time = problem.bases[k], problem.trials[k].curve_frames, problem.trials[k].time
     delay_sd_s = float(np.linalg.norm(root[problem.loads.delay_unknowns(k)].sum(axis=0)))
     moments = MomentsOfTrial(problem, k, static, problem.loads.reactions(k, static), delay_sd_s)
     joints, (d, c) = moments.virtual.joints, (len(frames), coefficients.shape[1])
@@ -120,7 +125,7 @@ def curve_deviations(
         coefficients,
         np.sqrt(noise),
         frames,
-        block_growth(problem, k, static, problem.trials[k].time[frames], joints),
+        block_growth(problem, k, static, time[frames], joints) * end_growth(basis, time, time[frames])[:, None],
         CurveDeviations.filled(d, c, len(joints), 0.0),
         np.empty((d, c + 6 * len(joints))),
         np.empty((d, c)),

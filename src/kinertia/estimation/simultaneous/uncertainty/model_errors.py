@@ -33,7 +33,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.linear_algebra.motion_basis import MotionBasis
+from kinertia.estimation.simultaneous.linear_algebra.motion_basis import STEADY_INTERVALS, MotionBasis
 from kinertia.estimation.simultaneous.search.problem import MapProblem
 from kinertia.model.kinematic_tree import in_segments
 from kinertia.model.skeleton import Skeleton
@@ -58,6 +58,9 @@ _UNSEEN = 3.0
 """Power of all errors over that of the observable ones: skin that moves as a block moves the segment, and leaves no
 residual. Chosen here; with it, intervals have their nominal coverage in a laboratory whose skin moves as blocks."""
 _LEAST_FREE = 0.1
+END_GROWTH = 0.75
+"""Accelerations at the very end of a motion are this much less certain than where they become steady. Chosen here: in
+walks by OpenSim, cut at both ends, the last 20 ms of knee flexion would be covered in 88 % without it."""
 _ENDS = 3
 """Knot intervals beside gaps and ends, where a fitted spline oscillates more than elsewhere."""
 _MOST_FRAMES = 6000
@@ -241,6 +244,14 @@ def block_growth(
         landings = np.append(-np.inf, trial.time[at])
         after = time - landings[np.searchsorted(landings, time, side="right") - 1] < LASTS_S
         result[np.ix_(after, [row in (f"hip_flexion_{side}", f"hip_{side} 0") for row in rows])] = GROWTH
+    return result
+
+
+def end_growth(basis: MotionBasis, frames_s: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Return factors (n,) on what the markers' errors make of moments at times (s) at the ends of the frames (s)."""
+    away_s = np.minimum(time - frames_s[0], frames_s[-1] - time)
+    outwards = 1.0 - away_s / (STEADY_INTERVALS * (basis.knots[1] - basis.knots[0]))
+    result: np.ndarray = 1.0 + END_GROWTH * np.clip(outwards, 0.0, 1.0)
     return result
 
 
