@@ -92,7 +92,8 @@ def test_moments_of_hips_are_less_certain_by_it(monkeypatch):
     names, sd = list(trial.skeleton.coordinates), []
     for share in (0.0, 0.3):
         monkeypatch.setattr(model_terms, "LEAST_TASK_SD", share)
-        sd.append(np.sqrt(np.square(fitted(trial).result.curve_deviations[0].moments).mean(axis=0)))
+        inner = fitted(trial).result.curve_deviations[0].moments[10:-10]  # at the ends the motion is least certain
+        sd.append(np.sqrt(np.square(inner).mean(axis=0)))
     longer = dict(zip(names, sd[1] / sd[0], strict=True))
     assert longer["hip_flexion_r"] > 1.01
     assert longer["pelvis_tx"] > 1.05
