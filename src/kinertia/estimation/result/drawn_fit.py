@@ -199,7 +199,7 @@ class DrawnCurves:
 
         Of the models' markers no curve depends.
         """
-        k, curves = trial.kinematics, trial.joint_curves
+        curves = trial.joint_curves
         time, motions = drawn_motions(trial, draws, numbers)
         angles = np.stack([drawn_motion.q for drawn_motion in motions], axis=2)
         through = partial(through_angles, derivative=0)
