@@ -217,7 +217,7 @@ def test_window_of_the_user(lab, marker_set):
             ("synthetic/long", "whole strides"),
             ("synthetic/run", "whole strides"),
             ("gait2354/subject01_walk1", "whole strides"),
-            ("field/hamner_run/subject02_running", "the whole window"),
+            ("field/hamner_run/subject02_running", "whole strides"),
         )
         if is_here(f"{name}.trc")
     ],
