@@ -10,9 +10,9 @@ at each session's mass. (The variance with the body less that of the body, which
 is uncertain itself, and leaves out that body and posture make up for each other in one estimate.)
 
 Markers that are put on anew displace an ankle's centre in shank and foot alike. The estimate, whose markers are off
-independently in both, lets it be off by 4 mm. The middle of two malleoli whose markers are off by 5 mm each, and by 5
-mm together, is off by 6 mm. Draws therefore displace it to the side by another 5 mm (`with_drawn_ankles`), as they do
-the knee's.
+independently in both, lets it be off by about 4 mm. The middle of two malleoli whose markers are off by 5 mm each, and
+by 5 mm together, is off by 6 mm. Draws therefore displace it to the side by another 5 mm (`with_drawn_ankles`), as they
+do the knee's.
 
 Deviations of a fit whose axes of knees and ankles were fixed are too short for what these axes decide: they are
 lengthened (`_FIXED_AXES`).
