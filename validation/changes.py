@@ -344,6 +344,7 @@ here do not.
 - Three markers show the pelvis, and one of them 6 mm off tilts it by 2 degrees. Marker places are therefore taken as
   10 mm uncertain between days: with 7 mm, hip angles of two people were covered in 67 %, with 10 mm in 87 %.
 - Forty people are the default; the table says how many were run, and its standard errors count them.
+- What errors come from was computed at commit b7593c1b, before motion at the ends of recordings was mended.
 - Where joint axes are fixed in the fits, `compare` multiplies deviations by 1.6. Axes are free here, so that this
   factor is not tested.
 - One walk of each kind, runs of two strides and people with two or three walks cannot show a rate between 3 and 8 %,
