@@ -179,7 +179,7 @@ def run_draw(seed: int, case: tuple[Scenario, int]) -> Draw:
     inside = np.flatnonzero(seen.separate[0].dynamic)
     after = Outcome(result.skeleton, result.bsp, result.motions[0].cut(inside), result.reactions[0])
     placed = result.skeleton.carrying(None), result.motions[0], seen.pooled[0], UNCERTAINTY
-    deviations = with_placement(result.curve_deviations[0], *placed)
+    deviations = with_placement(result.curve_deviations[0], *placed).at(np.isin(seen.separate[0].curve_frames, inside))
     return Draw(
         drawn.errors,
         drawn.literature_errors,
