@@ -1,7 +1,7 @@
 """Measures what errors of a day's angles and moments come from, on synthetic people: one source put in at a time.
 
-A source's error is that of a day with it alone, less that of a day without any. Moments are of the true body, as those
-of two days are of one body; what the estimate's own body makes up for does not cancel between days.
+The error of a source is that of a day with this source alone, minus that of a day with none. Moments are of the true
+body, as those of two days are of one body; what the estimate's own body makes up for does not cancel between days.
 """
 
 from collections import defaultdict

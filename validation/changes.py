@@ -292,8 +292,8 @@ pairs of days).
 
 What errors of a day come from, in {caused} people with other errors: RMS, N m/kg or degrees. *Stated*: the deviation
 of the difference over the square root of 2, of all people. *Shared* and *own*: placement of all markers of a segment
-together, and of each marker. A source's error is that of a day with it alone, less that of a day without any (last
-column). Moments are of the true body: what the estimated body makes up for does not cancel between days.
+together, and of each marker. The error of a source is that of a day with this source alone, minus that of a day with
+none (last column). Moments are of the true body: what the estimated body makes up for does not cancel between days.
 
 {causes}
 
@@ -319,12 +319,12 @@ here do not.
 
 ## What does not hold
 
-- Lumbar moments are covered least. Their errors are those of the trunk's lean in the laboratory (correlation 0.95 to
-  0.98 forwards): 1.4 to 1.8 degrees between days, where 1.1 are stated. What is stated is about what marker placement
-  makes. Skin motion adds as much, and is not stated: its mean over a stride is zero, and inverse kinematics
-  with the static trial's model leans the trunk by 0.1 degrees wrongly (four people, skin alone), but the estimate, in
-  which markers are 10 mm uncertain, turns pelvis and trunk under them, and is 0.7 degrees off. How much measured skin
-  makes of it takes a person recorded on two days, which is not at hand.
+- Lumbar moments are covered least. Their errors come from how far the trunk leans in the laboratory (correlation 0.95
+  to 0.98 forwards), which is 1.4 to 1.8 degrees off between days, where 1.1 are stated. What is stated is about what
+  marker placement makes. Skin motion adds as much, and is not stated: its mean over a stride is zero, and inverse
+  kinematics with the static trial's model leans the trunk by 0.1 degrees wrongly (four people, skin alone), but the
+  estimate, in which markers are 10 mm uncertain, turns pelvis and trunk under them, and is 0.7 degrees off. How much
+  measured skin makes of it takes a person recorded on two days, which is not at hand.
 - Hip rotation angles are covered in 90 % with a change. What is stated, 3 degrees of a day, is what the placement of
   each marker makes; skin and shared displacement add 1.6 and 1.2 degrees.
 - On the third day knees hyperextend to 13 to 16 degrees. The estimate expects few to go beyond 10 (SD 5), from which

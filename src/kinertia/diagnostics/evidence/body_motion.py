@@ -21,9 +21,9 @@ from kinertia.trial.marker_quality import Travel
 from kinertia.trial.sampled_data import span_s, within
 
 _PELVIS_HZ = 6.0
-_BESIDE_S, _LONG_S = 0.05, 1.3
+NEAR_END_S, LONG_WINDOW_S = 0.1, 1.3
 """So near to the ends of the recording velocities by markers are uncertain, which matters in windows shorter than the
-second."""
+second. Half of the first is left out of these."""
 LEAST_WINDOW_S, _LEAST_SPECIFIC = 0.4, 0.2
 LEAST_CHANGE_M_S, _FOLLOWS = 0.02, 0.7
 """Velocities whose changes have a smaller standard deviation carry no information on forces."""
@@ -129,7 +129,7 @@ def force_velocities(trial: Trial, owners: Mapping[str, str]) -> list[ForceVeloc
     first, last = markers.time[seen][[0, -1]]
     parts = []
     for start, end in windows:
-        beside_s = _BESIDE_S if end - start < _LONG_S else 0.0
+        beside_s = NEAR_END_S / 2.0 if end - start < LONG_WINDOW_S else 0.0
         inside = within(trial.loads.time, max(start, first + beside_s), min(end, last - beside_s))
         time, force = trial.loads.time[inside], trial.loads.force[inside].sum(axis=1)
         if len(time) < 10 or span_s(time) < LEAST_WINDOW_S or not force[:, 1].mean() > 0:

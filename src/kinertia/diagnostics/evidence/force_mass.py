@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.diagnostics.evidence.ambiguous_loads import OVERHANG_M, beyond_edges
+from kinertia.diagnostics.evidence.body_motion import NEAR_END_S
 from kinertia.diagnostics.evidence.foot_trajectories import periods
 from kinertia.diagnostics.evidence.landmarks import body_centre
 from kinertia.findings.quantity import Limit
@@ -53,9 +54,7 @@ _WINDOW_S, _STILL_M = 0.2, 0.005
 _BETWEEN, _ASIDE_M = (0.15, 0.85), 0.15
 """Range between the feet of the load of both: beyond it, one of them also stands on something else."""
 _CENTRE_HZ = 8.0
-_ALONE_N, _UNLOADED_N, _SHORTEST_S, _BESIDE_S = 50.0, 10.0, 0.2, 0.1
-"""Of support by one plate, whose ends must be as far as the last from those of the recording: nearer, the velocity of
-the body's centre is uncertain, and a sound plate seemed to weigh 9 % more than the other."""
+_ALONE_N, _UNLOADED_N, _SHORTEST_S = 50.0, 10.0, 0.2
 ADULT_KG = Limit(70.0, "kg")
 _ADULT_N = ADULT_KG * GRAVITY_M_S2
 _HEAVIEST_PERCENT = 95.0
@@ -147,10 +146,8 @@ def force_mass(segment_of_label: Mapping[str, str], trial: Trial, standing: bool
         return None
     height, force = place[:, 1], loads.force[:, :, 1].sum(axis=1)
     fast = smooth(around.time, height, _FAST_HZ)
-    change_sd = dict(CHANGE_SD_M_S)
-    change_sd["the whole window"] = max(
-        change_sd["the whole window"], _SHARE_OF_VELOCITY * float(np.std(fast(time, 1)))
-    )
+    of_velocity = _SHARE_OF_VELOCITY * float(np.std(fast(time, 1)))
+    change_sd = CHANGE_SD_M_S | {"the whole window": max(CHANGE_SD_M_S["the whole window"], of_velocity)}
     found: list[tuple[float, float, str]] = []
     for over, first, last in _spans(loads, float(time[0]), float(time[-1]), standing):
         here, lasts_s = within(loads.time, first, last), last - first
@@ -302,8 +299,9 @@ def plate_masses(
         masses_kg = []
         for first, last in runs((vertical > _ALONE_N) & (others < _UNLOADED_N) & measured):
             span = span_s(plates.time, first, last)
-            beside = min(plates.time[first] - markers.time[0], markers.time[-1] - plates.time[last])
-            if span < _SHORTEST_S or beside < _BESIDE_S:
+            beside_s = min(plates.time[first] - markers.time[0], markers.time[-1] - plates.time[last])
+            # nearer to the ends a sound plate seemed to weigh 9 % more than the other
+            if span < _SHORTEST_S or beside_s < NEAR_END_S:
                 continue
             step = np.diff(plates.time[first : last + 1])
             impulse = float(((vertical[first + 1 : last + 1] + vertical[first:last]) / 2 * step).sum())

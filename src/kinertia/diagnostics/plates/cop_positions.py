@@ -192,8 +192,8 @@ def _displaced(context: RecordingContext) -> Iterator[Hypothesis]:
 
 
 def _offset(context: RecordingContext) -> Iterator[Finding]:
-    """Report P243: loads of both feet are displaced in one direction of the laboratory, those of a foot measured alone
-    beside its axis, or all loads along the feet.
+    """Report P243: the loads of both feet are displaced in the same direction of the laboratory; or, where one foot is
+    measured, its loads lie beside its axis; or all loads are displaced along the feet.
     """
     contacts = one_foot_loads(context)
     means = [[_foot_offset_m(contact) for contact in contacts if contact.foot == foot] for foot in range(2)]

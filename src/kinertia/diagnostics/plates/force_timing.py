@@ -25,6 +25,8 @@ import numpy as np
 from kinertia.diagnostics.context import PersonContext, RecordingContext
 from kinertia.diagnostics.evidence.body_motion import (
     LARGEST_RESIDUAL,
+    LONG_WINDOW_S,
+    NEAR_END_S,
     ForceVelocity,
     joined_without_trend,
     vertical_match_of,
@@ -63,10 +65,8 @@ of the other plate differ by no more than this. On nine walks this holds for eve
 limits, and for no plate with a simulated foot 10 to 30 mm over its edge."""
 _LEAST_RATE_WINDOW_S, _LEAST_GROWTH = 1.0, Limit(0.0105, usual=(-0.004, 0.004))
 """By pelvis or by marker-based centre the delay of 21 fault-free trials grows by -0.017 to 0.013 in windows of 1.03 to
-1.3 s and by up to 0.002 in longer ones, and by both in one direction by at most 0.004."""
-_BESIDE_S, _LONG_RATE_WINDOW_S = 0.1, 1.3
-"""Shorter windows than the second must be this far from the ends of the recording, where velocities by markers are
-uncertain: in parts of fault-free trials delays grow by up to 0.029 in them, in longer ones by at most 0.0065."""
+1.3 s and by up to 0.002 in longer ones, and by both in one direction by at most 0.004. In windows shorter than
+LONG_WINDOW_S that reach the ends of the recording they grow by up to 0.029, in longer ones by at most 0.0065."""
 _LEAST_RATIO, _MOST_RATIO, _TYPICAL_RATIO = Limit(0.4, usual=(0.67, 0.99)), Limit(1.8), 0.9
 """On 26 fault-free trials, from squats to runs; at half the true rate it is four times as much."""
 _APART = Limit(0.25)
@@ -252,8 +252,8 @@ def _growing_delays(context: RecordingContext) -> Iterator[Finding]:
     if trial is None:
         return
     for part in context.velocities:
-        beside = min(part.time[0] - trial.markers.time[0], trial.markers.time[-1] - part.time[-1])
-        if span_s(part.time) < (_LEAST_RATE_WINDOW_S if beside >= _BESIDE_S else _LONG_RATE_WINDOW_S):
+        beside_s = min(part.time[0] - trial.markers.time[0], trial.markers.time[-1] - part.time[-1])
+        if span_s(part.time) < (_LEAST_RATE_WINDOW_S if beside_s >= NEAR_END_S else LONG_WINDOW_S):
             continue
         found = vertical_match_of(part, growing=True)
         if not found or max(match.residual for match in found) > LARGEST_RESIDUAL:

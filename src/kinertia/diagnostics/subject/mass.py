@@ -95,7 +95,7 @@ def stated_mass(context: PersonContext) -> Iterator[Finding]:
     total = context.total_mass
     if total is None:
         return
-    known = {trial.name: mass for trial in context.trials if (mass := trial.force_mass) is not None}
+    known = _known(context)
     apart = _apart(context, total)
     for name, found in apart.items():
         missing, complete = Quantity(found.missing, "1", limit=MISSING), Quantity(found.complete, "1")
@@ -117,9 +117,9 @@ def _ends_of_steps(known: Mapping[str, ForceMass], total: TotalMass) -> Iterator
     for name, mass in known.items():
         missing = 1.0 - mass.mass_kg / total.total_kg
         if not mass.is_borne and missing > _MOSTLY_MISSING:
-            span = float(mass.time[0]), float(mass.time[-1])
-            shares = Quantity(missing, "1", limit=_MOSTLY_MISSING), Quantity(0.0, "1")
-            yield finding("P281", Where(trial=name, span_s=span), Severity.ERROR, missing=shares[0], complete=shares[1])
+            where = Where(trial=name, span_s=(float(mass.time[0]), float(mass.time[-1])))
+            share = Quantity(missing, "1", limit=_MOSTLY_MISSING)
+            yield finding("P281", where, Severity.ERROR, missing=share, complete=Quantity(0.0, "1"))
 
 
 def weighed_as_stated(context: PersonContext, other_kg: float) -> bool:
@@ -141,7 +141,7 @@ def masses_of_trials(context: PersonContext) -> Iterator[Finding]:
     """Report S306: of two trials whose forces give different masses, the one that static trial, other trials and stated
     mass contradict.
     """
-    known = {trial.name: mass for trial in context.trials if (mass := trial.force_mass) is not None and mass.is_borne}
+    known = {name: mass for name, mass in _known(context).items() if mass.is_borne}
     standing = [occasion.mass_kg for occasion in _standing(context)]
     for (first, first_mass), (other, others) in combinations(known.items(), 2):
         lighter_kg = min(first_mass.mass_kg, others.mass_kg)
@@ -166,22 +166,24 @@ def _occasion(name: str | None, mass: ForceMass, standing: bool = False) -> _Occ
     return _Occasion(name, mass.mass_kg, float(np.hypot(mass.sd_kg, _REPEATED * mass.mass_kg)), mass.over, standing)
 
 
+def _known(context: PersonContext) -> dict[str, ForceMass]:
+    """Return the masses of the trials, by name, that forces and markers show."""
+    return {trial.name: mass for trial in context.trials if (mass := trial.force_mass) is not None}
+
+
 def _apart(context: PersonContext, total: TotalMass) -> dict[str, UnmeasuredSupport]:
     """Return the trials by name in which part of the weight is off the plates for a while."""
-    known = {trial.name: trial.force_mass for trial in context.trials if trial.force_mass is not None}
-    return {name: found for name, mass in known.items() if (found := mass.unmeasured(total.total_kg)) is not None}
+    return {
+        name: found for name, mass in _known(context).items() if (found := mass.unmeasured(total.total_kg)) is not None
+    }
 
 
 def _whole(context: PersonContext, apart: Container[str]) -> list[_Occasion]:
     """Return the masses of the trials in which all of the weight is on the plates."""
     by_plates = _by_plates(context)
     better = {occasion.trial for occasion in by_plates}
-    known = (
-        (trial.name, trial.force_mass)
-        for trial in context.trials
-        if trial.name not in apart and trial.name not in better
-    )
-    return [*by_plates, *(_occasion(name, mass) for name, mass in known if mass is not None and mass.is_borne)]
+    known = ((name, mass) for name, mass in _known(context).items() if name not in apart and name not in better)
+    return [*by_plates, *(_occasion(name, mass) for name, mass in known if mass.is_borne)]
 
 
 def _by_plates(context: PersonContext) -> list[_Occasion]:

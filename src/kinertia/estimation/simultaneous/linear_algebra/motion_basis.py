@@ -70,18 +70,18 @@ class MotionBasis:
         knots = begin + step * np.arange(-_DEGREE, count + _ACTIVE)
         self.intervals = count
         self.size = count + _DEGREE
-        self.first = np.minimum(((time - begin) / step + _ROUNDING).astype(int), count - 1)
+        place = (time - begin) / step
+        self.first = np.minimum((place + _ROUNDING).astype(int), count - 1)
         # on a uniform grid all splines are shifted copies of one
         shape = BSpline.basis_element(np.arange(_ACTIVE + 1.0))
-        local = (time - begin) / step - self.first
+        local = place - self.first
         at = local[:, None] + np.arange(_DEGREE, -1, -1)
         self.values = np.stack([shape.derivative(d)(at) / step**d if d else shape(at) for d in range(3)])
         self.active = self.first[:, None] + np.arange(_ACTIVE)
         self.knots = knots
-        place = (time - begin) / step
         self._steady = np.arange(len(time))
-        self._steady[place - place[0] < STEADY_INTERVALS] = np.flatnonzero(place - place[0] < STEADY_INTERVALS)[-1]
-        self._steady[place[-1] - place < STEADY_INTERVALS] = np.flatnonzero(place[-1] - place < STEADY_INTERVALS)[0]
+        for near, innermost in ((place - place[0] < STEADY_INTERVALS, -1), (place[-1] - place < STEADY_INTERVALS, 0)):
+            self._steady[near] = np.flatnonzero(near)[innermost]
 
     @cached_property
     def steady_values(self) -> np.ndarray:
