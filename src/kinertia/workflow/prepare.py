@@ -8,12 +8,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.plates.steps import positions_by_feet
 from kinertia.diagnostics.subject.body_data import stated_ranges
 from kinertia.errors import SettingsError
 from kinertia.estimation.prepared import Prepared, Progress, check_trials
 from kinertia.estimation.prior import BspPrior
+from kinertia.estimation.simultaneous.instruments.priors import ModelUncertainty
+from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.workload import one_blas_thread
 from kinertia.settings import Settings
 from kinertia.workflow.masses import with_attached, with_doubted_mass
@@ -81,7 +86,7 @@ def prepared(
         skeleton=model.skeleton,
         literature=model.uncertainty.whole(model.prior.mean),
         prior=with_doubted_mass(model.prior, screened.findings) if prior is None else prior,
-        uncertainty=model.uncertainty,
+        uncertainty=_with_feet(model.uncertainty, usable, solved.with_forces.kinematics),
         file=person.model,
         kinematics=solved.with_forces.kinematics,
         seconds=solved.with_forces.seconds,
@@ -99,6 +104,17 @@ def prepared(
     ready, by_itself = (ready, ()) if known is None else known.leaned_on(ready)
     ready = with_attached(ready, by_itself)
     return ready if known is None else known.measured_on(ready)
+
+
+def _with_feet(
+    uncertainty: ModelUncertainty, contexts: Sequence[RecordingContext], solved: Sequence[Kinematics]
+) -> ModelUncertainty:
+    """Return the uncertainty with what steps of these trials tell of the plates' positions."""
+    plates = tuple(dict.fromkeys(plate for k in solved for plate in k.trial.loads.plates))
+    names = {k.trial.name for k in solved}
+    shown = positions_by_feet([context for context in contexts if context.name in names], plates)
+    feet = () if shown is None else (shown,)
+    return replace(uncertainty, instruments=replace(uncertainty.instruments, feet=feet))
 
 
 def _expect_used(settings: Settings, person: Person, prior: BspPrior | None) -> None:

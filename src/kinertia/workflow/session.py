@@ -120,7 +120,8 @@ def with_instruments(
             f"none of the session's plates ({', '.join(sorted(theirs))}) is among this person's "
             f"({', '.join(sorted(of_person))}); plates are matched by name"
         )
-    prior = InstrumentPrior.stated(stated, [_information(person) for person in others])
+    feet = ready.uncertainty.instruments.feet
+    prior = replace(InstrumentPrior.stated(stated, [_information(person) for person in others]), feet=feet)
     findings = ready.findings
     if session:
         left_out = [person.name for person in session if person not in others]

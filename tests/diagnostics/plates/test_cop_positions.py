@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.plates import cop_positions
-from kinertia.diagnostics.plates.cop_positions import shows_feet_equally
+from kinertia.diagnostics.plates import cop_positions, steps
+from kinertia.diagnostics.plates.steps import shows_feet_equally
 from kinertia.findings.finding import Severity
 from kinertia.findings.quantity import Where
 from kinertia.trial.data import Markers
@@ -161,7 +161,7 @@ def test_how_far_loads_may_lie_along_feet(recording_of):
 )
 def test_an_offset_moves_both_where_loads_begin_and_where_they_push_off(monkeypatch, begin_mm, push_off_mm, found):
     """A person of 1.8 m on whose foot either lies so far in front of where it is on other people."""
-    monkeypatch.setattr(cop_positions, "_bears_elsewhere", lambda step, context: False)
+    monkeypatch.setattr(steps, "_bears_elsewhere", lambda step, context: False)
     ahead_m = 1.8 * np.array([0.033, 0.107]) + 1e-3 * np.array([begin_mm, push_off_mm])
     step = SimpleNamespace(is_step=True, ahead_m=lambda shares: ahead_m)
     context = SimpleNamespace(height_m=1.8, whole_contacts=[step], at=lambda: Where())

@@ -101,6 +101,11 @@ class FootTrajectory:
         """Return the foot extended by toes in front of the metatarsal heads, where no marker shows them."""
         return replace(self, front=self.front + _TOES * (self.front - self.back))
 
+    def heading(self, time: FloatArray, weight: FloatArray) -> FloatArray:
+        """Return the mean direction (2,) from heel to forefoot, a unit vector, weighted over these times (k,)."""
+        along: FloatArray = weight @ (self._at(self.front, time) - self._at(self.back, time))
+        return along / np.linalg.norm(along)
+
     def expected_cop(self, time: FloatArray, weight: FloatArray) -> FloatArray:
         """Predict the centre of pressure (k, 2) m of a step with this vertical force (k,) N at these times (k,)."""
         back, front = (self._at(end, time) for end in (self.back, self.front))

@@ -23,7 +23,6 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.ambiguous_loads import FOOT_ENDS, off_plate
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory
 from kinertia.diagnostics.evidence.plate_contacts import (
-    END_SHARE,
     FAR_M,
     Hypothesis,
     PlateContact,
@@ -42,6 +41,18 @@ from kinertia.diagnostics.plates.contact_delays import (
     stance_durations,
 )
 from kinertia.diagnostics.plates.plate_positions import WRONG_M, interchanged_plates, rotated_plates
+from kinertia.diagnostics.plates.steps import (
+    BACK_M,
+    FORWARD_M,
+    OF_HEIGHT,
+    USUAL_ALONG_M,
+    ahead_of_usual_m,
+    goes_forwards,
+    heel_steps,
+    one_foot_loads,
+    shows_feet_equally,
+    steps_alone,
+)
 from kinertia.diagnostics.runner import NEEDS_LOADS_UNDER_FEET, check
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Limit, Quantity
@@ -61,17 +72,10 @@ which may be on the metatarsals."""
 _BOTH_BACK_M, _BOTH_FORWARD_M = (0.02, -0.07), (0.13, 0.035)
 """Where the first twentieth of steps and their last one are both, on average, farther back, or farther forward, landing
 or pushing off cannot be the reason. On nine fault-free trials they are 36 to 85 mm and -58 to 25 mm."""
-_BEGIN_OF_HEIGHT, _LATE_OF_HEIGHT, _LATE = 0.033, 0.107, 0.85
-_USUAL_ALONG_M = (-0.016, 0.03)
 _EACH_SHARE = 0.5
 """Displaced plates move the centre of pressure by as much at the beginning as at push-off: each must exceed this
 share of the limit. On a fault-free synthetic person, who lands behind the heel, the mean is -35 mm, but that at
 push-off only -12 mm."""
-_BACK_M, _FORWARD_M = Limit(-0.026, "m", usual=_USUAL_ALONG_M), Limit(0.042, "m", usual=_USUAL_ALONG_M)
-"""Where a twentieth and 85 % of a step's load have acted, the centre of pressure is this share of stature in front of
-the heel marker. The mean of both differs from it by -16 to 30 mm (mean 4, SD 10) in the walks and runs of 26 people of
-1.12 to 1.83 m in 14 laboratories, by as much in one step as in many.
-"""
 _FIXED_M = Limit(0.002, "m")
 _USUAL = (0.06, 0.82)
 _BACKWARDS, _FORWARDS = Limit(-0.35, usual=_USUAL), Limit(0.25)
@@ -97,8 +101,8 @@ _MOST_SHARE = Limit(0.5)
     beside=_BESIDE_M,
     begin=_BEGIN_M,
     end=_END_M,
-    back=_BACK_M,
-    forward=_FORWARD_M,
+    back=BACK_M,
+    forward=FORWARD_M,
     wrong=WRONG_M,
     least_ratio=RATES[0],
     most_ratio=RATES[1],
@@ -263,36 +267,22 @@ def _ends(context: RecordingContext, contacts: Sequence[PlateContact]) -> Iterat
 
 def _along_feet(context: RecordingContext, steps: Sequence[PlateContact]) -> Iterator[Finding]:
     """Report P243: steps wholly on plates whose centre of pressure is farther back, or forward, than feet are long."""
-    if context.height_m is None:
+    alone = steps_alone(context, steps)
+    if context.height_m is None or not alone:
         return
-    whole = set(map(id, context.whole_contacts))
-    alone = [step for step in steps if step.is_step and id(step) in whole and not _bears_elsewhere(step, context)]
-    if not alone:
-        return
-    begin, late = np.mean([step.ahead_m((END_SHARE, _LATE)) for step in alone], axis=0)
-    offsets = np.array([begin, late]) - context.height_m * np.array([_BEGIN_OF_HEIGHT, _LATE_OF_HEIGHT])
+    offsets = np.mean([ahead_of_usual_m(step, context.height_m) for step in alone], axis=0)
     excess = float(offsets.mean())
-    limit = _BACK_M if excess < 0 else _FORWARD_M
+    limit = BACK_M if excess < 0 else FORWARD_M
     if abs(excess) <= abs(limit) or (offsets / limit).min() < _EACH_SHARE:
         return
+    begin, late = offsets + context.height_m * OF_HEIGHT
     yield _origin(
         context,
-        Quantity(excess, "m", limit=limit, usual=_USUAL_ALONG_M),
+        Quantity(excess, "m", limit=limit, usual=USUAL_ALONG_M),
         len(alone),
         "where loads act on feet of this person's length",
         begin_m=Quantity(float(begin), "m"),
         push_off_m=Quantity(float(late), "m"),
-    )
-
-
-def _bears_elsewhere(step: PlateContact, context: RecordingContext) -> bool:
-    """Return whether the foot of a step loads another plate, too."""
-    return any(
-        contact is not step
-        and contact.foot == step.foot
-        and contact.time[0] < step.time[-1]
-        and step.time[0] < contact.time[-1]
-        for contact in context.contacts
     )
 
 
@@ -341,44 +331,6 @@ def _progression_m(contact: PlateContact, foot: FootTrajectory) -> float:
     ahead = foot.beyond(contact.time, contact.place)[0]
     third = max(len(ahead) // 3, 1)
     return float(np.median(ahead[-third:]) - np.median(ahead[:third]))
-
-
-def goes_forwards(context: RecordingContext) -> bool:
-    """Return whether loads can be expected between heel and toe: whole feet are visible and the person does not walk
-    backwards."""
-    return context.shows_whole_feet and not context.walks_backwards
-
-
-def heel_steps(context: RecordingContext) -> list[PlateContact]:
-    """Return the loads that can be expected to progress from heel to toe: of one foot that does not land on its
-    forefoot, in strides that do not go backwards."""
-    if not context.has_strides or not goes_forwards(context):
-        return []
-    return [
-        contact
-        for contact in one_foot_loads(context)
-        if not contact.trajectory.lands_on_forefoot(contact.start_s, contact.end_s)
-    ]
-
-
-def one_foot_loads(context: RecordingContext) -> list[PlateContact]:
-    """Return the loads without those that both feet bear on one plate; if these seem to be most, the loads are at a
-    wrong position instead, and count."""
-    shared = {id(load.contact) for load in context.shared_loads}
-    unshared = [contact for contact in context.contacts if id(contact) not in shared]
-    return unshared if 2 * len(unshared) >= len(context.contacts) else list(context.contacts)
-
-
-def shows_feet_equally(context: RecordingContext) -> bool:
-    """Return whether the same markers of both feet are visible: else their lines from heel to toe differ."""
-    if context.marker_set is None:
-        return False
-    landmarks, seen = context.marker_set.landmarks, context.seen_labels
-    right, left = (
-        [len(seen.intersection(landmarks.get(f"{name}_{side}", ()))) for end in FOOT_ENDS for name in end]
-        for side in "rl"
-    )
-    return right == left
 
 
 @check("P245", unless=("P204",), off_plate=OFF_PLATE_SHARE, most=_MOST_SHARE)

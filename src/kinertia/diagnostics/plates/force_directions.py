@@ -25,7 +25,7 @@ from kinertia.diagnostics.evidence.body_motion import (
     rotated_residual,
 )
 from kinertia.diagnostics.evidence.force_mass import loaded_wrenches
-from kinertia.diagnostics.plates.forces_of_steps import AWAY, MUCH_SMALLER, forces_of_steps, moment_reversed
+from kinertia.diagnostics.plates.steps import AWAY, MUCH_SMALLER, forces_of_steps, moment_reversed
 from kinertia.diagnostics.runner import NEEDS_VELOCITY, NEEDS_VERTICAL_FORCE, check
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Limit, Quantity

@@ -8,7 +8,14 @@ from typing import Self
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.instruments.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS
+from kinertia.estimation.simultaneous.instruments.plates import (
+    FLOOR_UNKNOWNS,
+    PLATE_ERRORS,
+    PLATE_UNKNOWNS,
+    X,
+    Z,
+    plates_with_floor,
+)
 from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, FaultMixture
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.gait27 import AXIS_TILTS, HIP_OFFSETS, LEG_AXIS_TILTS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
@@ -93,6 +100,31 @@ class InstrumentInformation:
         rhs = after @ mean - sum(known_rhs for _, known_rhs in before)
         return cls(tuple(plates), *_never_negative(information, rhs, np.sqrt(np.diag(after))))
 
+    @classmethod
+    def of_positions(
+        cls,
+        plates: Sequence[str],
+        on: Sequence[str],
+        along: np.ndarray,
+        ahead_m: np.ndarray,
+        covariance: np.ndarray,
+    ) -> InstrumentInformation:
+        """Return what loads tell that act farther ahead than expected: their plates may be displaced by as much.
+
+        Args:
+            plates: names.
+            on: name of the plate of each of m loads.
+            along: (m, 2) unit vectors in the floor's plane (x, z).
+            ahead_m: (m,) m along these.
+            covariance: (m, m) of what people differ by without displaced plates.
+        """
+        to_plates = plates_with_floor(len(plates)).reshape(len(plates), len(PLATE_ERRORS), -1)
+        places = to_plates[[plates.index(name) for name in on]][:, [X, Z]]
+        # errors of plates are subtracted from what they read
+        rows = -np.pad(np.einsum("mx,mxk->mk", along, places), ((0, 0), (0, 1)))
+        weighted = np.linalg.solve(covariance, rows)
+        return cls(tuple(plates), rows.T @ weighted, ahead_m @ weighted)
+
     def without_own(self, sd: np.ndarray) -> InstrumentInformation:
         """Eliminate the t unknowns that are specific to trials, which come last, given their standard deviations (t,).
 
@@ -152,6 +184,7 @@ class InstrumentPrior:
         zero_offset_n: prior of the zero offsets of each plate's horizontal forces in each trial.
         trial_gain: prior of each plate's additional gain error in each trial.
         session: information from other people measured with the same instruments.
+        feet: information of this person's steps, by where they act on the feet; it is part of what the trials show.
         incomplete: plates of whose loads a part is missing: these trials do not show their gains, which stay nominal.
 
     >>> stated = InstrumentPrior.stated(Instruments(plate_sd_mm=1.0))
@@ -166,6 +199,7 @@ class InstrumentPrior:
     zero_offset_n: FaultMixture = ZERO_PRIOR_N
     trial_gain: FaultMixture = TRIAL_GAIN_PRIOR
     session: tuple[InstrumentInformation, ...] = ()
+    feet: tuple[InstrumentInformation, ...] = ()
     incomplete: frozenset[str] = frozenset()
 
     @classmethod
@@ -219,10 +253,17 @@ class InstrumentPrior:
 
     def of_session(self, plates: Sequence[str]) -> InstrumentInformation:
         """Return the information of the session's other people on these plates, combined."""
+        return self._combined(self.session, plates)
+
+    def beside_root(self, plates: Sequence[str]) -> InstrumentInformation:
+        """Return all information on these plates that is not from the root equations, combined."""
+        return self._combined((*self.session, *self.feet), plates)
+
+    def _combined(self, sources: Sequence[InstrumentInformation], plates: Sequence[str]) -> InstrumentInformation:
         size = len(PLATE_UNKNOWNS) * len(plates) + len(FLOOR_UNKNOWNS) + 1
         information, rhs = np.zeros((size, size)), np.zeros(size)
-        for person in self.session:
-            shown = person.among(plates, self)
+        for source in sources:
+            shown = source.among(plates, self)
             information += shown.information
             rhs += shown.rhs
         return InstrumentInformation(tuple(plates), information, rhs)

@@ -76,15 +76,16 @@ class InstrumentErrors(LoadTerm):
         self._own = [[given.plates.index(name) for name in trial.ground.plates] for trial in given.trials]
         self._to_plates = plates_with_floor(len(given.plates))
         self._session = given.calibration.instruments.of_session(given.plates)
+        self._known = given.calibration.instruments.beside_root(given.plates)
 
     def add_information(self, into: np.ndarray, static: np.ndarray) -> None:
-        """Add the information from other people of the session."""
+        """Add the information from other people of the session, and from the person's feet."""
         at = self.layout.laboratory
-        into[at, at] += self._session.information
+        into[at, at] += self._known.information
 
     def add_pull(self, rhs: np.ndarray, static: np.ndarray) -> float:
-        """Add the right-hand side from other people of the session, and return the change in twice the cost."""
-        errors, shown = static[self.layout.laboratory], self._session
+        """Add the right-hand side of the same, and return the change in twice the cost."""
+        errors, shown = static[self.layout.laboratory], self._known
         pull = shown.information @ errors
         rhs[self.layout.laboratory] += shown.rhs - pull
         return float(errors @ (pull - 2.0 * shown.rhs))

@@ -1,0 +1,135 @@
+"""Wrong axes and signs are found where one foot alone meets a plate; fault-free forces point to the body. Steps tell
+where plates are, by where they act on the feet.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from kinertia.diagnostics.evidence.plate_contacts import displaced
+from kinertia.diagnostics.plates.force_directions import force_directions
+from kinertia.diagnostics.plates.steps import (
+    OF_HEIGHT,
+    ahead_of_usual_m,
+    forces_of_steps,
+    heel_steps,
+    positions_by_feet,
+    steps_alone,
+)
+from plate_findings import context_of, with_force
+from recordings import QUICK_WALKS, RUNS, SQUATS, WALKS, slow_beside
+
+FAULT_FREE = {**WALKS, **RUNS, **SQUATS}
+
+
+@pytest.fixture(params=slow_beside(QUICK_WALKS, WALKS))
+def walk(request, recording_of):
+    """Two steps on two plates."""
+    return recording_of(*WALKS[request.param])
+
+
+def of_one_foot(recording, turn):
+    """One plate measures, with turned or mirrored forces."""
+    kept = (np.arange(recording.plates.force.shape[1]) == 0)[:, None]
+    return context_of(with_force(recording, lambda force: (force * kept) @ turn.T))
+
+
+@pytest.mark.parametrize("name", slow_beside(QUICK_WALKS, FAULT_FREE))
+def test_fault_free_forces_point_to_the_body(recording_of, name):
+    assert [*forces_of_steps(context_of(recording_of(*FAULT_FREE[name])))] == []
+
+
+def test_one_step_without_faults(walk):
+    assert [*force_directions(of_one_foot(walk, np.eye(3)))] == []
+
+
+def test_the_sign_of_one_axis_of_one_step(walk):
+    """That along the walk; across it feet may be nearly below the body."""
+    found = {}
+    for axis in (0, 2):
+        signs = np.ones(3)
+        signs[axis] = -1.0
+        context = of_one_foot(walk, np.diag(signs))
+        found[axis] = [*force_directions(context)]
+        assert all(
+            (finding.code, finding.where) == ("P232", context.at(**context.along(axis))) for finding in found[axis]
+        )
+        assert all(finding.evidence["correlation"].value < -0.3 for finding in found[axis])
+    assert any(found.values())
+
+
+@pytest.mark.parametrize("angle_deg", [90, -90, 180])
+def test_rotated_forces_of_one_step(walk, angle_deg):
+    turn = Rotation.from_euler("y", angle_deg, degrees=True).as_matrix()
+    (found,) = [*force_directions(of_one_foot(walk, turn))]
+    assert found.code == "P231"
+    assert np.degrees(found.evidence["angle_rad"].value) == pytest.approx(angle_deg)
+    assert found.evidence["correlation_undone"].value > 0.5
+
+
+def on_usual_feet(recording, forward_m=0.0):
+    """Contexts of a walk, and of the same walk back, whose steps act where they do on other people, or farther forward.
+
+    The synthetic person lands behind the heel.
+    """
+    context = context_of(recording, height_m=1.7)
+    beyond_m = np.mean([ahead_of_usual_m(step, 1.7) for step in steps_alone(context, heel_steps(context))])
+    plates = displaced(recording.plates, np.array([forward_m + 0.004 - beyond_m, 0.0]))
+    back = Rotation.from_euler("y", np.pi).as_matrix()
+    markers = replace(recording.markers, positions=recording.markers.positions @ back.T)
+    force, moment = plates.force @ back.T, plates.moment @ back.T
+    corners = None if plates.corners is None else plates.corners @ back.T
+    there = replace(recording, plates=plates)
+    other = replace(recording, markers=markers, plates=replace(plates, force=force, moment=moment, corners=corners))
+    return [context_of(walk, height_m=1.7) for walk in (there, other)]
+
+
+def common_position(shown, axis):
+    """Common displacement of all plates along an axis, m, and its deviation, if plates have none of their own."""
+    place = len(shown.rhs) - 4 + axis
+    return -shown.rhs[place] / shown.information[place, place], shown.information[place, place] ** -0.5
+
+
+@pytest.mark.parametrize("forward_m", [-0.02, 0.0, 0.02])
+def test_steps_tell_where_plates_are(walk, forward_m):
+    there, back = on_usual_feet(walk, forward_m)
+    names = walk.plates.names
+    value_m, sd_m = common_position(positions_by_feet([there], names), 0)
+    assert value_m == pytest.approx(forward_m, abs=0.004)
+    assert 0.009 < sd_m < 0.013
+    across_m = common_position(positions_by_feet([there], names), 1)[1]
+    assert across_m > 2.0 * sd_m
+    # where this person's loads act on the feet does not matter there and back
+    value_m, sd_m = common_position(positions_by_feet([there, back], names), 0)
+    assert value_m == pytest.approx(0.0, abs=0.004)
+    assert sd_m < 0.006
+
+
+def test_what_is_reported_tells_nothing(walk):
+    names = walk.plates.names
+    assert positions_by_feet(on_usual_feet(walk, 0.036), names) is not None
+    assert positions_by_feet(on_usual_feet(walk, 0.04), names) is None
+    assert positions_by_feet(on_usual_feet(walk, -0.029), names) is not None
+    assert positions_by_feet(on_usual_feet(walk, -0.031), names) is None
+    assert positions_by_feet([context_of(walk)], names) is None
+
+
+def test_feet_that_differ_tell_nothing(walk):
+    (there, _) = on_usual_feet(walk)
+    (first, *others) = steps_alone(there, heel_steps(there))
+    of_one = np.arange(len(walk.plates.names)) == first.plate
+    assert any(step.plate != first.plate for step in others)
+    for apart_m in (0.03, 0.05):
+        by = np.stack([np.where(of_one, apart_m, 0.0), np.zeros(len(of_one))], axis=1)
+        plates = displaced(there.recording.plates, by - by.mean(axis=0))
+        moved = context_of(replace(there.recording, plates=plates), height_m=1.7)
+        assert (positions_by_feet([moved], walk.plates.names) is None) is (apart_m == 0.05)
+
+
+def test_usual_places_are_shares_of_stature(walk):
+    context = context_of(walk)
+    (step, *_) = heel_steps(context)
+    taller, smaller = ahead_of_usual_m(step, 1.8), ahead_of_usual_m(step, 1.5)
+    np.testing.assert_allclose(smaller - taller, 0.3 * OF_HEIGHT)
