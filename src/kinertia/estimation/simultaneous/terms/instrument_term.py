@@ -19,7 +19,7 @@ import numpy as np
 from kinertia.estimation.simultaneous.inputs import FreedModel, Given, Unknowns
 from kinertia.estimation.simultaneous.instruments.instrument_errors import FoundErrors, instrument_errors
 from kinertia.estimation.simultaneous.instruments.plates import GAIN, PLATE_ERRORS, ZERO_UNKNOWNS, plates_with_floor
-from kinertia.estimation.simultaneous.instruments.priors import InstrumentInformation
+from kinertia.estimation.simultaneous.instruments.priors import SOFT_TISSUE_LAG_S, InstrumentInformation
 from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, FaultMixture, fault_probabilities
 from kinertia.estimation.simultaneous.observation import Observation
 from kinertia.estimation.simultaneous.terms.cost_term import CostTerm, LoadTerm, Solution
@@ -91,12 +91,18 @@ class InstrumentErrors(LoadTerm):
         return float(errors @ (pull - 2.0 * shown.rhs))
 
     def left_out(self, static: np.ndarray) -> np.ndarray:
-        """Return the zero offsets that a tilt about each horizontal axis imitates (`mean_loads_n`)."""
+        """Return the zero offsets that a tilt about each horizontal axis imitates (`mean_loads_n`), and the delay that
+        soft tissue imitates in several trials; a single one's has a profile.
+        """
         result = np.zeros((len(static), len(ZERO_UNKNOWNS)))
         for k, trial in enumerate(self.given.trials):
             for axis, places in enumerate(self.zeros_of(k).T):
                 result[places, axis] = TILT_SD_RAD * mean_loads_n(trial)
-        return result
+        if self.given.calibration.instruments.delay_s.fault_probability == 0.0 or self.profiled():
+            return result
+        lag = np.zeros((len(static), 1))
+        lag[self.layout[CLOCK]] = SOFT_TISSUE_LAG_S[1]
+        return np.hstack([result, lag])
 
     def delay_unknowns(self, k: int) -> list[int]:
         """Return the indices of the synchronisation delay and of the trial's own delay."""

@@ -8,8 +8,8 @@ do not move are averaged over all of them, and their spread is part of their cov
 A single linearisation makes the delay too certain: changes of force over milliseconds are correlated with motion and
 body, and the second derivatives that Gauss-Newton leaves out make the profile a fifth to a quarter wider in walks.
 Whether delayed or synchronous forces are likelier depends on its width exponentially. The profile is therefore
-evaluated at three delays, and its parabola combined with the priors of the synchronisation delay and of the trial's own
-delay, each with two components.
+evaluated at three delays, and its parabola, less what soft tissue lags, combined with the priors of the synchronisation
+delay and of the trial's own delay, each with two components.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,6 +18,7 @@ from typing import Self
 
 import numpy as np
 
+from kinertia.estimation.simultaneous.instruments.priors import SOFT_TISSUE_LAG_S
 from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, GaussianPrior
 from kinertia.estimation.simultaneous.search.gauss_newton import GaussNewton
 from kinertia.estimation.simultaneous.search.problem import Linearised, MapProblem, Point, Slope
@@ -177,8 +178,10 @@ class CostProfile:
         curve, slope, _ = np.polyfit(delays, costs, 2)
         if not curve > 0.0:
             return unchanged
-        shown = np.full((len(places), len(places)), 2.0 * curve)
-        rhs = np.full(len(places), 2.0 * curve * values.sum() - slope)
+        lag, lag_sd = SOFT_TISSUE_LAG_S
+        certain = 1.0 / (0.5 / curve + lag_sd**2)
+        shown = np.full((len(places), len(places)), certain)
+        rhs = np.full(len(places), certain * (values.sum() - 0.5 * slope / curve - lag))
         gaussian = GaussianPrior.given(ErrorPriors(tuple(priors)), shown, rhs)
         found = np.linalg.solve(shown + gaussian.precision, rhs + gaussian.pull)
         linear = (known - instruments.precision[np.ix_(places, places)]).mean()
