@@ -112,8 +112,7 @@ def _with_feet(
     """Return the uncertainty with what steps of these trials tell of the plates' positions."""
     plates = tuple(dict.fromkeys(plate for k in solved for plate in k.trial.loads.plates))
     names = {k.trial.name for k in solved}
-    shown = positions_by_feet([context for context in contexts if context.name in names], plates)
-    feet = () if shown is None else (shown,)
+    feet = positions_by_feet([context for context in contexts if context.name in names], plates)
     return replace(uncertainty, instruments=replace(uncertainty.instruments, feet=feet))
 
 

@@ -2,8 +2,9 @@
 
 In walks of 18 people in 11 laboratories the mean of where a step begins and pushes off, as far in front of the heel as
 is usual at the person's stature, differs by 9 mm (SD) between people, 7 mm between feet and 5 mm between the steps of
-a foot. Plates displaced along the walk displace it by as much. Who walks there and back shows them more precisely: in
-the laboratory the person's own part then changes its sign.
+a foot. Plates displaced along the walk displace it by as much, and plates displaced across it take the loads of both
+feet to the same side. Who walks there and back shows them more precisely: in the laboratory the person's own part then
+changes its sign.
 
 A force points from the foot to the body, roughly: over the vertical force, the horizontal one resembles the horizontal
 way from the centre of pressure to the marker-based centre, over the centre's height. Of 38 recordings (walks, runs,
@@ -22,7 +23,7 @@ from kinertia.diagnostics.evidence.plate_contacts import END_SHARE, PlateContact
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentInformation
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Limit, Quantity
-from kinertia.trial.data import FloatArray, PlateLoads
+from kinertia.trial.data import BoolArray, FloatArray, PlateLoads
 from kinertia.trial.ground_contact import FIRM_LOAD_N, free_moment
 from kinertia.trial.sampled_data import nearest_samples, rms, within
 
@@ -38,6 +39,9 @@ _MEAN_ALONG_M, _PERSON_SD_M, _FOOT_SD_M, _STEP_SD_M = 0.004, 0.009, 0.008, 0.005
 foot."""
 _FEET_APART_M = 0.04
 """In these people one foot's steps act up to 23 mm farther forward than the other's."""
+_SIDEWAYS_SD_M, _OUTWARD_SD_M, _BOTH_BESIDE_M = 0.004, 0.05, 0.01
+"""Steps of both feet together act within 9 mm (SD 4) of the axes of the feet in 19 walks of 16 people; each foot's are
+up to 44 mm outward or inward of it, by where its markers are."""
 AWAY = Limit(-0.3, usual=(0.2, 1.0))
 MUCH_SMALLER = Limit(0.5)
 _LEAST_WAY, _POINTING, _FEWEST = 0.03, Limit(0.5, usual=(0.72, 0.94)), 10
@@ -108,31 +112,57 @@ def ahead_of_usual_m(step: PlateContact, height_m: float) -> FloatArray:
     return step.ahead_m((END_SHARE, _LATE)) - height_m * OF_HEIGHT
 
 
-def positions_by_feet(contexts: Sequence[RecordingContext], plates: Sequence[str]) -> InstrumentInformation | None:
-    """Return what steps tell of the positions of plates, by where they act on feet of the person's length; or None.
-
-    Nothing is told by steps that P243 would report, and where one foot's are much farther forward than the other's.
+def positions_by_feet(contexts: Sequence[RecordingContext], plates: Sequence[str]) -> tuple[InstrumentInformation, ...]:
+    """Return what steps tell of the positions of plates, by where they act on the feet: along them and across.
 
     Args:
         contexts: of all recordings of one person whose forces are used.
         plates: their names.
     """
     rows = [
-        (step.foot, context.plates.names[step.plate], step, float(ahead_of_usual_m(step, context.height_m).mean()))
+        (context.plates.names[step.plate], step, context.height_m)
         for context in contexts
-        if context.height_m is not None and context.plates is not None and shows_feet_equally(context)
+        if context.plates is not None and shows_feet_equally(context)
         for step in steps_alone(context, heel_steps(context))
     ]
     if not rows:
+        return ()
+    on, steps, heights_m = zip(*rows, strict=True)
+    forward = np.array([step.trajectory.heading(step.time, step.weight) for step in steps])
+    left = np.column_stack([forward[:, 1], -forward[:, 0]])
+    same_foot = np.equal.outer(*2 * [[step.foot for step in steps]])
+    found = ((forward, _ahead_of_others(steps, heights_m, same_foot)), (left, _beside_feet(steps, left, same_foot)))
+    return tuple(InstrumentInformation.of_positions(plates, on, way, *told) for way, told in found if told is not None)
+
+
+def _ahead_of_others(
+    steps: Sequence[PlateContact], heights_m: Sequence[float | None], same_foot: BoolArray
+) -> tuple[FloatArray, FloatArray] | None:
+    """Return how much farther forward (m,) m than in other people m steps act, and the covariance of that without
+    displaced plates; None without the stature, of steps that P243 would report, and of feet that differ."""
+    known_m = [height_m for height_m in heights_m if height_m is not None]
+    if len(known_m) < len(steps):
         return None
-    feet, on, steps, beyond_m = zip(*rows, strict=True)
-    same_foot, beyond = np.equal.outer(feet, feet), np.array(beyond_m)
-    of_feet = [float(beyond[same].mean()) for same in same_foot]
-    if not BACK_M < float(beyond.mean()) < FORWARD_M or np.ptp(of_feet) > _FEET_APART_M:
+    ahead = np.array([ahead_of_usual_m(step, height_m).mean() for step, height_m in zip(steps, known_m, strict=True)])
+    of_feet = [float(ahead[same].mean()) for same in same_foot]
+    if not BACK_M < float(ahead.mean()) < FORWARD_M or np.ptp(of_feet) > _FEET_APART_M:
         return None
-    along = np.array([step.trajectory.heading(step.time, step.weight) for step in steps])
-    covariance = _PERSON_SD_M**2 + _FOOT_SD_M**2 * same_foot + _STEP_SD_M**2 * np.eye(len(steps))
-    return InstrumentInformation.of_positions(plates, on, along, beyond - _MEAN_ALONG_M, covariance)
+    return ahead - _MEAN_ALONG_M, _PERSON_SD_M**2 + _FOOT_SD_M**2 * same_foot + _STEP_SD_M**2 * np.eye(len(steps))
+
+
+def _beside_feet(
+    steps: Sequence[PlateContact], left: FloatArray, same_foot: BoolArray
+) -> tuple[FloatArray, FloatArray] | None:
+    """Return how much farther left (m,) m than the feet's axes m steps act, and its covariance as above; None of one
+    foot, and of both feet farther to one side than in anyone else."""
+    if same_foot.all():
+        return None
+    beside = np.array([float(step.own_offset_m @ direction) for step, direction in zip(steps, left, strict=True)])
+    both_m = (beside[same_foot[0]].mean() + beside[~same_foot[0]].mean()) / 2
+    if abs(both_m) > _BOTH_BESIDE_M:
+        return None
+    outward = _OUTWARD_SD_M**2 * np.where(same_foot, 1.0, -1.0)
+    return beside, _SIDEWAYS_SD_M**2 + outward + _STEP_SD_M**2 * np.eye(len(steps))
 
 
 def forces_of_steps(context: RecordingContext) -> Iterator[Finding]:
