@@ -92,7 +92,7 @@ def test_files_have_every_joint_and_nan_where_it_is_not_known(result):
 def test_draws_spread_as_the_error_bars_say(fit_of, walk):
     """Also what a hinge transmits, in which the knee's geometry is drawn, too."""
     fit = load_fit(fit_of(walk).folder)
-    (trial,), count = fit.trials, min(kept_draws(fit).count, 60)
+    (trial,), count = fit.trials, kept_draws(fit).count
     drawn = np.array([drawn_fit(fit, n).trials[0].joint_curves.joints["estimate"].moments for n in range(count)])
     apart = np.nanmean(np.square(drawn - trial.joint_curves.joints["estimate"].moments), axis=(0, 1))
     reported = np.nanmean(np.square(trial.joint_curves.moment_sd), axis=0)

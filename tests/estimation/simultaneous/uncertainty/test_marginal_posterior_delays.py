@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from kinertia.estimation.simultaneous.instruments.priors import SOFT_TISSUE_LAG_S
 from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, FaultMixture, GaussianPrior
 from kinertia.estimation.simultaneous.uncertainty.marginal_posterior import CostProfile, with_left_out
 
@@ -76,10 +77,13 @@ def parts_of(prior: FaultMixture) -> list[tuple[float, float]]:
 
 
 def integrated(parts) -> tuple[float, float]:
-    """Mean and variance of the delay with a prior that is a sum of Gaussians: shares and deviations."""
+    """Mean and variance of the delay with a prior that is a sum of Gaussians: shares and deviations. What the cost
+    shows is late by what soft tissue lags, too.
+    """
+    lag_s, lag_sd_s = SOFT_TISSUE_LAG_S
     delay = np.linspace(-0.01, 0.02, 60001)
     prior = sum(share / sd * np.exp(-0.5 * (delay / sd) ** 2) for share, sd in parts)
-    weight = prior * np.exp(-0.5 * ((delay - SHOWN_S) / SD_S) ** 2)
+    weight = prior * np.exp(-0.5 * ((delay + lag_s - SHOWN_S) / np.hypot(SD_S, lag_sd_s)) ** 2)
     mean = np.average(delay, weights=weight)
     return mean, np.average(np.square(delay - mean), weights=weight)
 
