@@ -134,11 +134,13 @@ def estimate_simultaneous(
     model = GaussNewton.of(problem, there.here).under(there.instruments)
     moved, more = _left_out(problem, model, ended.point.static)
     static = ended.point.static
-    corrected = static + problem.shortened_static(phases.static + profile.static - 2.0 * static + moved)
-    point = followed(model, ended.point, corrected)
+    averaged = phases.static + profile.static - 2.0 * static
+    here = followed(model, ended.point, static + problem.shortened_static(averaged))
     begin, end = ended.cost
     more_cost = max(_AVERAGED, _AVERAGED_SHARE * (begin - end))
-    if problem.slope(point).under(ended.instruments)[0] < end + more_cost:
+    # what is left out has no cost of its own, so that moving for it always adds to the cost
+    if problem.slope(here).under(ended.instruments)[0] < end + more_cost:
+        point = followed(model, ended.point, static + problem.shortened_static(averaged + moved))
         ended = there._replace(point=point)
     else:
         point, model = ended.point, GaussNewton.of(problem, ended.here).under(ended.instruments)
