@@ -204,3 +204,14 @@ def test_calibrate_goes_with_a_model(synthetic_lab, tmp_path):
     outcome = run("fit", *words, "--calibrate", "-o", tmp_path / "out")
     assert outcome.status == 2
     assert "F193 calibrate in [model] and a static trial" in " ".join(outcome.err.split())
+
+
+@pytest.mark.slow
+def test_whole_squats_end_with_a_plausible_body(measured_folder, tmp_path):
+    """What thighs weigh less in squats is left out of the cost; that it adds to the cost refused the average."""
+    lab = measured_folder / "subject4"
+    files = [lab / "squats1.trc", "--forces", lab / "squats1_grf.mot", "--loads", lab / "squats1_external_forces.xml"]
+    model = ["--model", lab / "addbiomechanics_scaled.osim", "--calibrate", "--mass", "62.6"]
+    folder = fitted(tmp_path / "out", *map(str, [*files, *model])).folder
+    summary = json.loads((folder / "fit.json").read_text())
+    assert "R203" not in {finding["code"] for finding in summary["findings"]}

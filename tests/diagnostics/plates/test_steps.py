@@ -161,6 +161,14 @@ def test_feet_that_differ_tell_nothing(walk_of_both):
         assert (common_position(positions_by_feet([moved], walk_of_both.plates.names), X) is not None) is told
 
 
+@pytest.mark.parametrize("name", slow_beside(("synthetic",), RUNS))
+def test_steps_of_runs_tell_nothing(recording_of, name):
+    recording = recording_of(*RUNS[name])
+    context = context_of(recording, height_m=1.75)
+    assert heel_steps(context)
+    assert positions_by_feet([context], recording.plates.names) == ()
+
+
 def test_usual_places_are_shares_of_stature(walk):
     context = context_of(walk)
     (step, *_) = heel_steps(context)
