@@ -52,13 +52,13 @@ DELAY_PRIOR_S = FaultMixture(0.0003, 0.005, 0.2, faulty_mean=0.006)
 """Delay of the forces. Synchronous: half a sample of the plates. Delayed: with a prior that says nothing (SD 20 ms), 80
 recordings of 26 laboratories have apparent delays of 4.3 ms with an SD of 4.4 between laboratories, 8.2 where
 amplifiers are analogue and 2.3 elsewhere: rather late than early. Delays are assumed rarer than among these: of 20
-people with synchronous forces, delays of 3 ms in every second laboratory cost ankle moments a quarter more than these.
+people with synchronous forces, delays of 3 ms in every second laboratory make ankle moments err by a fifth more.
 Forces that are 10 ms early are found as well as with a mean of zero."""
 SOFT_TISSUE_LAG_S = 0.0003, 0.001
 """Mean and SD of what seems to be a delay and is none: soft tissue lags behind. It is 1.1 ms where skin moves as it was
 measured on one person, 0 where it moves with the joints' angles, and in walks of 23 laboratories delays are 1.7 +- 0.9
 ms shorter below 4 Hz. Taken for a delay, it makes ankle moments of the first err by a seventh more, with forces on time
-or 10 ms late. A mean of 0.5 ms would cost as much of the second, where forces are late."""
+or 10 ms late. With a mean of 0.5 ms, those of the second would err by 8 % more where forces are late."""
 TRIAL_DELAY_PRIOR_S = FaultMixture(0.00003, 0.010, 0.04)
 """Delay of one trial, besides the synchronisation delay: cameras and plates that start together do so in every trial;
 of two runs on one treadmill, forces of the first are delayed by 8.4 ms and of the second by 13.5. A stated
@@ -125,7 +125,7 @@ class InstrumentInformation:
         """
         to_plates = plates_with_floor(len(plates)).reshape(len(plates), len(PLATE_ERRORS), -1)
         places = to_plates[[plates.index(name) for name in on]][:, [X, Z]]
-        # errors of plates are subtracted from what they read
+        # unknowns are true minus recorded positions
         rows = -np.pad(np.einsum("mx,mxk->mk", along, places), ((0, 0), (0, 1)))
         weighted = np.linalg.solve(covariance, rows)
         return cls(tuple(plates), rows.T @ weighted, ahead_m @ weighted)
