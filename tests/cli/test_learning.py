@@ -323,6 +323,29 @@ def test_people_who_contradict_each_other_are_named():
     assert found == pytest.approx([0.010, 0.002], abs=1e-4)
 
 
+def test_fits_of_one_person_show_plates_no_better_than_one():
+    """But the delay, which is not their body's."""
+
+    def fitted(*files):
+        information = np.diag([1e5] * 8 + [1e6])
+        rhs = tuple((information @ [0.010, *[0.0] * 7, 0.010]).tolist())
+        rows = tuple(map(tuple, information.tolist()))
+        return PersonInstruments(name=files[0], files=files, plates=("plate 1",), information=rows, rhs=rhs)
+
+    def found(*people):
+        errors = session_instruments(people, Instruments()).found
+        return errors["plate 1"]["position x"][:2], errors["synchronisation"]["delay"][1]
+
+    once, again, other = fitted("static", "walk 1"), fitted("walk 2", "static"), fitted("another's static", "walk")
+    (one_m, one_sd_m), one_s = found(once)
+    (same_m, same_sd_m), same_s = found(once, again)
+    (two_m, two_sd_m), two_s = found(once, other)
+    assert (same_m, same_sd_m) == pytest.approx((one_m, one_sd_m), rel=1e-6)
+    assert same_s == two_s == pytest.approx(one_s / np.sqrt(2.0), rel=0.05)
+    assert two_sd_m < 0.9 * one_sd_m
+    assert abs(two_m) > abs(one_m)
+
+
 def test_columns_of_force_files_are_plates_only_where_somebody_says_so(sample_walk, tmp_path):
     walk = sample_walk / "gait2354" / "subject01_walk1"
     text = f"""

@@ -83,7 +83,7 @@ def session_instruments(people: Sequence[PersonInstruments], stated: Instruments
 
 def _errors(people: Sequence[PersonInstruments], stated: Instruments) -> tuple[CalibrationEntry, ...]:
     plates = tuple(dict.fromkeys(name for person in people for name in person.plates))
-    prior = InstrumentPrior.stated(stated, [_information(person) for person in people])
+    prior = InstrumentPrior.stated(stated, _informations(people))
     shown, unknowns = prior.of_session(plates), prior.of_unknowns(plates)
     after = GaussianPrior.given(unknowns, shown.information, shown.rhs)
     covariance = np.linalg.inv(shown.information + after.precision)
@@ -121,7 +121,7 @@ def with_instruments(
             f"({', '.join(sorted(of_person))}); plates are matched by name"
         )
     feet = ready.uncertainty.instruments.feet
-    prior = replace(InstrumentPrior.stated(stated, [_information(person) for person in others]), feet=feet)
+    prior = replace(InstrumentPrior.stated(stated, _informations(others)), feet=feet)
     findings = ready.findings
     if session:
         left_out = [person.name for person in session if person not in others]
@@ -137,6 +137,15 @@ def with_instruments(
 
 def _listed(names: Sequence[str]) -> str:
     return f"{len(names)} {'person' if len(names) == 1 else 'people'} ({', '.join(names)})"
+
+
+def _informations(people: Sequence[PersonInstruments]) -> list[InstrumentInformation]:
+    """Return the information of each person; results that share a file are fits of one person's trials."""
+    persons: list[list[PersonInstruments]] = []
+    for person in people:
+        same = [fits for fits in persons if any(set(person.files) & set(other.files) for other in fits)]
+        persons = [fits for fits in persons if fits not in same] + [[*(fit for fits in same for fit in fits), person]]
+    return [InstrumentInformation.of_one_person([_information(fit) for fit in fits]) for fits in persons]
 
 
 def _information(person: PersonInstruments) -> InstrumentInformation:

@@ -130,6 +130,29 @@ class InstrumentInformation:
         weighted = np.linalg.solve(covariance, rows)
         return cls(tuple(plates), rows.T @ weighted, ahead_m @ weighted)
 
+    @classmethod
+    def of_one_person(cls, fits: Sequence[InstrumentInformation]) -> InstrumentInformation:
+        """Combine fits of trials of one person, each made alone.
+
+        What a person's body makes of the forces seems an error of the plates in all of them: together they show plates
+        no better than one. Five walks of one person said a vertical moment of 1.7 +- 0.3 N m/kN by their sum, 1.5 +-
+        0.6 by a joint estimate, and each 0.6. Delays are known better from several.
+        """
+        if len(fits) == 1:
+            return fits[0]
+        plates, count = tuple(dict.fromkeys(name for fit in fits for name in fit.plates)), len(fits)
+        every = [fit.among(plates, InstrumentPrior()) for fit in fits]
+        information = np.sum([fit.information for fit in every], axis=0)
+        rhs = np.sum([fit.rhs for fit in every], axis=0)
+        scale = np.sqrt(np.maximum(np.diag(information)[:-1], np.finfo(float).tiny))
+        of_plates, across = information[:-1, :-1] / np.outer(scale, scale), information[:-1, -1] / scale
+        known = np.linalg.pinv(of_plates, rcond=1e-9, hermitian=True) @ np.column_stack([across, rhs[:-1] / scale])
+        more, more_rhs = (1.0 - 1.0 / count) * (across @ known)
+        information, rhs = information / count, rhs / count
+        information[-1, -1] = count * information[-1, -1] - more
+        rhs[-1] = count * rhs[-1] - more_rhs
+        return cls(plates, information, rhs)
+
     def without_own(self, sd: np.ndarray) -> InstrumentInformation:
         """Eliminate the t unknowns that are specific to trials, which come last, given their standard deviations (t,).
 
