@@ -16,6 +16,7 @@ from kinertia.errors import SessionError
 from kinertia.estimation.learnt_prior import information_of
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.result.drawn_fit import drawn_fit
+from kinertia.estimation.simultaneous.instruments.priors import InstrumentInformation
 from kinertia.io.file_names import command_line
 from kinertia.io.norms_file import read_norms
 from kinertia.io.subject.learnt_files import PersonInstruments, read_session
@@ -344,6 +345,17 @@ def test_fits_of_one_person_show_plates_no_better_than_one():
     assert same_s == two_s == pytest.approx(one_s / np.sqrt(2.0), rel=0.05)
     assert two_sd_m < 0.9 * one_sd_m
     assert abs(two_m) > abs(one_m)
+
+
+def test_a_fit_that_shows_little_takes_nothing_from_another_of_the_same_person():
+    strong, weak = (
+        InstrumentInformation(("plate 1",), np.diag([each] * 8 + [1e6]), np.append(np.full(8, each * 0.01), 1e4))
+        for each in (1e5, 1e2)
+    )
+    both = InstrumentInformation.of_one_person([strong, weak])
+    np.testing.assert_allclose(np.diag(both.information)[:8], 1e5, rtol=0.2)
+    np.testing.assert_allclose(both.rhs[:8] / np.diag(both.information)[:8], 0.01)
+    assert (both.information[8, 8], both.rhs[8]) == pytest.approx((2e6, 2e4))
 
 
 def test_columns_of_force_files_are_plates_only_where_somebody_says_so(sample_walk, tmp_path):

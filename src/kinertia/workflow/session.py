@@ -126,7 +126,7 @@ def with_instruments(
     if session:
         left_out = [person.name for person in session if person not in others]
         source = (
-            f"plates and synchronisation are known from {_listed([p.name for p in others])}"
+            f"plates and synchronisation are known from {_listed([fits[0].name for fits in _persons(others)])}"
             if others
             else "nothing of others"
         )
@@ -139,13 +139,18 @@ def _listed(names: Sequence[str]) -> str:
     return f"{len(names)} {'person' if len(names) == 1 else 'people'} ({', '.join(names)})"
 
 
-def _informations(people: Sequence[PersonInstruments]) -> list[InstrumentInformation]:
-    """Return the information of each person; results that share a file are fits of one person's trials."""
+def _persons(people: Sequence[PersonInstruments]) -> list[list[PersonInstruments]]:
+    """Group results by person: those that share a file are fits of one person's trials."""
     persons: list[list[PersonInstruments]] = []
     for person in people:
         same = [fits for fits in persons if any(set(person.files) & set(other.files) for other in fits)]
         persons = [fits for fits in persons if fits not in same] + [[*(fit for fits in same for fit in fits), person]]
-    return [InstrumentInformation.of_one_person([_information(fit) for fit in fits]) for fits in persons]
+    return persons
+
+
+def _informations(people: Sequence[PersonInstruments]) -> list[InstrumentInformation]:
+    """Return the information of each person."""
+    return [InstrumentInformation.of_one_person([_information(fit) for fit in fits]) for fits in _persons(people)]
 
 
 def _information(person: PersonInstruments) -> InstrumentInformation:

@@ -22,6 +22,7 @@ from plate_findings import context_of, with_force
 from recordings import QUICK_WALKS, RUNS, SQUATS, WALKS, slow_beside
 
 X, Z = range(2)
+BY_M = np.array([0.03, 0.0])
 FAULT_FREE = {**WALKS, **RUNS, **SQUATS}
 
 
@@ -125,6 +126,29 @@ def test_steps_of_both_feet_tell_where_plates_are_across(walk_of_both):
     after_m, _ = common_position(positions_by_feet([moved], walk_of_both.plates.names), Z)
     assert after_m - before_m == pytest.approx(aside_m, abs=1e-3)
     assert 0.004 < sd_m < 0.006
+
+
+def test_there_and_back_show_what_is_displaced_in_the_laboratory(walk_of_both):
+    """By more than one direction could tell from this person's feet."""
+    contexts = [
+        context_of(
+            replace(walk.recording, plates=displaced(walk.recording.plates, np.array([0.03, 0.0]))), height_m=1.7
+        )
+        for walk in on_usual_feet(walk_of_both)
+    ]
+    value_m, sd_m = common_position(positions_by_feet(contexts, walk_of_both.plates.names), X)
+    assert value_m == pytest.approx(0.03, abs=0.004)
+    assert sd_m < 0.006
+
+
+def test_steps_outside_the_stated_window_tell_nothing(walk_of_both):
+    (there, _) = on_usual_feet(walk_of_both)
+    first = min(steps_alone(there, heel_steps(there)), key=lambda step: step.start_s)
+    names = walk_of_both.plates.names
+    within = context_of(there.recording, height_m=1.7, window_s=(first.start_s, first.start_s + 0.1))
+    outside = context_of(there.recording, height_m=1.7, window_s=(-9.0, first.start_s - 0.1))
+    assert common_position(positions_by_feet([within], names), X)[1] > 0.012
+    assert positions_by_feet([outside], names) == ()
 
 
 def test_what_is_reported_tells_nothing(walk_of_both):

@@ -1,10 +1,10 @@
 """Selects steps on plates. Where do they act on the feet, and do their forces point to the body?
 
-In walks of 18 people in 11 laboratories the mean of where a step begins and pushes off, as far in front of the heel as
-is usual at the person's stature, differs by 9 mm (SD) between people, 7 mm between feet and 5 mm between the steps of
-a foot. Plates displaced along the walk displace it by as much, and plates displaced across it take the loads of both
-feet to the same side. Who walks there and back shows them more precisely: in the laboratory the person's own part then
-changes its sign.
+How far in front of the heel a step acts, relative to what is usual at the person's stature, has SDs of 9 mm between
+people, 8 mm between the feet of a person and 5 mm between the steps of a foot, in walks of 18 people in 11
+laboratories. Plates that are displaced along the walk change it by as much; plates displaced across the walk move the
+loads of both feet to the same side. Walks there and back show plates more precisely: the person's own part then changes
+its sign in the laboratory.
 
 A force points from the foot to the body, roughly: over the vertical force, the horizontal one resembles the horizontal
 way from the centre of pressure to the marker-based centre, over the centre's height. Of 38 recordings (walks, runs,
@@ -35,8 +35,8 @@ the heel marker. The mean of both differs from it by -16 to 30 mm (mean 4, SD 10
 1.12 to 1.83 m in 14 laboratories, by as much in one step as in many.
 """
 _MEAN_ALONG_M, _PERSON_SD_M, _FOOT_SD_M, _STEP_SD_M = 0.004, 0.009, 0.008, 0.005
-"""Of that mean, in walks of 18 people in 11 laboratories: between people, between feet of a person, and steps of a
-foot."""
+"""In walks of 18 people in 11 laboratories: the mean, and SDs between people, between the feet of a person (7 mm, of
+few), and between the steps of a foot."""
 _LONGEST_RUNNING_S = 0.4
 """A step of a walk is longer; where runners land differs more between people."""
 _FEET_APART_M = 0.04
@@ -115,7 +115,9 @@ def ahead_of_usual_m(step: PlateContact, height_m: float) -> FloatArray:
 
 
 def positions_by_feet(contexts: Sequence[RecordingContext], plates: Sequence[str]) -> tuple[InstrumentInformation, ...]:
-    """Return what steps tell of the positions of plates, by where they act on the feet: along them and across.
+    """Return what steps show of the positions of plates, by where they act on the feet: along them and across.
+
+    Steps of runs do not count, nor those outside the window that the user states or with other people's loads.
 
     Args:
         contexts: of all recordings of one person whose forces are used.
@@ -127,6 +129,8 @@ def positions_by_feet(contexts: Sequence[RecordingContext], plates: Sequence[str
         if context.plates is not None and shows_feet_equally(context)
         for step in steps_alone(context, heel_steps(context))
         if step.end_s - step.start_s > _LONGEST_RUNNING_S
+        and context.uses((step.start_s, step.end_s))
+        and step not in context.foreign_contacts
     ]
     if not rows:
         return ()
@@ -142,7 +146,8 @@ def _ahead_of_others(
     steps: Sequence[PlateContact], heights_m: Sequence[float | None], same_foot: BoolArray
 ) -> tuple[FloatArray, FloatArray] | None:
     """Return how much farther forward (m,) m than in other people m steps act, and the covariance of that without
-    displaced plates; None without the stature, of steps that P243 would report, and of feet that differ."""
+    displaced plates; None without the stature, where feet differ, and where the mean of all steps is beyond P243's
+    limits."""
     known_m = [height_m for height_m in heights_m if height_m is not None]
     if len(known_m) < len(steps):
         return None

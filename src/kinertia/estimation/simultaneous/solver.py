@@ -133,17 +133,15 @@ def estimate_simultaneous(
     there = ended._replace(here=profile.here, instruments=profile.instruments)
     model = GaussNewton.of(problem, there.here).under(there.instruments)
     moved, more = _left_out(problem, model, ended.point.static)
-    static = ended.point.static
-    averaged = phases.static + profile.static - 2.0 * static
-    here = followed(model, ended.point, static + problem.shortened_static(averaged))
-    begin, end = ended.cost
+    static, (begin, end) = ended.point.static, ended.cost
+    averaged = phases.static - static
+    between = followed(model, ended.point, static + problem.shortened_static(averaged))
     more_cost = max(_AVERAGED, _AVERAGED_SHARE * (begin - end))
-    # what is left out has no cost of its own, so that moving for it always adds to the cost
-    if problem.slope(here).under(ended.instruments)[0] < end + more_cost:
-        point = followed(model, ended.point, static + problem.shortened_static(averaged + moved))
-        ended = there._replace(point=point)
-    else:
-        point, model = ended.point, GaussNewton.of(problem, ended.here).under(ended.instruments)
+    if problem.slope(between).under(ended.instruments)[0] >= end + more_cost:
+        averaged = np.zeros_like(static)
+    moved += profile.static - static
+    point = followed(model, ended.point, static + problem.shortened_static(averaged + moved))
+    ended = there._replace(point=point)
     roots = _roots_in_trials(problem, ended, model)
     modes = [of_knots(phases), *of_root(model, point, more)]
     motions, (covariance, curves, draws) = both(

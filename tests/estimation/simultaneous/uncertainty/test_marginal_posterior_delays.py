@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kinertia.estimation.simultaneous.instruments.priors import SOFT_TISSUE_LAG_S
 from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, FaultMixture, GaussianPrior
 from kinertia.estimation.simultaneous.uncertainty.marginal_posterior import CostProfile, with_left_out
 
@@ -14,6 +13,7 @@ CLOCK, OWN = FaultMixture(0.0003, 0.008, 0.3), FaultMixture(0.00003, 0.01, 0.05)
 
 
 SHOWN_S, SD_S = 0.004, 0.0015
+LAG_S = 0.0007, 0.0012
 
 
 FOLLOWS, BODY_SD = 20.0, 0.1
@@ -38,7 +38,10 @@ def problem(priors):
     n = len(priors)
     layout = SimpleNamespace(errors=slice(0, n), error_priors=ErrorPriors(tuple(priors)))
     return SimpleNamespace(
-        layout=layout, profiled=lambda: list(range(n)), slope=lambda at: SimpleNamespace(cost=cost(at.static, n))
+        layout=layout,
+        profiled=lambda: list(range(n)),
+        imitated=lambda: LAG_S,
+        slope=lambda at: SimpleNamespace(cost=cost(at.static, n)),
     )
 
 
@@ -80,7 +83,7 @@ def integrated(parts) -> tuple[float, float]:
     """Mean and variance of the delay with a prior that is a sum of Gaussians: shares and deviations. What the cost
     shows is late by what soft tissue lags, too.
     """
-    lag_s, lag_sd_s = SOFT_TISSUE_LAG_S
+    lag_s, lag_sd_s = LAG_S
     delay = np.linspace(-0.01, 0.02, 60001)
     prior = sum(share / sd * np.exp(-0.5 * (delay / sd) ** 2) for share, sd in parts)
     weight = prior * np.exp(-0.5 * ((delay + lag_s - SHOWN_S) / np.hypot(SD_S, lag_sd_s)) ** 2)

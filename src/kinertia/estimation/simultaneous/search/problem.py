@@ -212,7 +212,8 @@ class MapProblem:
         return result
 
     def prior_information(self, static: np.ndarray) -> np.ndarray:
-        """Return the information (S, S) of all priors but those of errors, including other people of the session."""
+        """Return the information (S, S) of all priors but those of errors, with that of the session's other people and
+        of the person's steps."""
         result = np.diag(self.layout.weight)
         for term in self.terms:
             term.add_information(result, static)
@@ -235,6 +236,11 @@ class MapProblem:
     def profiled(self) -> list[int]:
         """Return the indices of errors whose sum gets its posterior from the profile of the cost; it may be empty."""
         return [at for term in self.terms for at in term.profiled()]
+
+    def imitated(self) -> tuple[float, float]:
+        """Return mean and SD of what the data take for that sum, and is none."""
+        means, deviations = zip(*(term.imitated() for term in self.terms), strict=True)
+        return sum(means), float(np.hypot.reduce(deviations))
 
     def read(self, solution: Solution) -> list[dict[str, Any]]:
         """Return what each term reads from the solution."""

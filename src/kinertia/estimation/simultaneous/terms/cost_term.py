@@ -108,6 +108,10 @@ class CostTerm:
         """Return indices of errors whose sum gets its posterior from the profile of the cost."""
         return []
 
+    def imitated(self) -> tuple[float, float]:
+        """Return mean and SD of what the data take for the sum of the profiled errors, and is none."""
+        return 0.0, 0.0
+
     def read(self, solution: Solution) -> dict[str, Any]:
         """Return this term's fields of `SimultaneousResult`; the "calibration" entries of several terms are joined."""
         return {}

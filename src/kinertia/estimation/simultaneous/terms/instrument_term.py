@@ -91,18 +91,12 @@ class InstrumentErrors(LoadTerm):
         return float(errors @ (pull - 2.0 * shown.rhs))
 
     def left_out(self, static: np.ndarray) -> np.ndarray:
-        """Return the zero offsets that a tilt about each horizontal axis imitates (`mean_loads_n`), and the delay that
-        soft tissue imitates in several trials; a single one's has a profile.
-        """
+        """Return the zero offsets that a tilt about each horizontal axis imitates (`mean_loads_n`)."""
         result = np.zeros((len(static), len(ZERO_UNKNOWNS)))
         for k, trial in enumerate(self.given.trials):
             for axis, places in enumerate(self.zeros_of(k).T):
                 result[places, axis] = TILT_SD_RAD * mean_loads_n(trial)
-        if self.given.calibration.instruments.delay_s.fault_probability == 0.0 or self.profiled():
-            return result
-        lag = np.zeros((len(static), 1))
-        lag[self.layout[CLOCK]] = SOFT_TISSUE_LAG_S[1]
-        return np.hstack([result, lag])
+        return result
 
     def delay_unknowns(self, k: int) -> list[int]:
         """Return the indices of the synchronisation delay and of the trial's own delay."""
@@ -115,6 +109,10 @@ class InstrumentErrors(LoadTerm):
         mixtures = [priors[at - self.layout.errors.start] for at in places]
         uncertain = any(0.0 < prior.fault_probability < 1.0 for prior in mixtures)
         return places if uncertain and sum(map(bool, self._own)) < 2 else []
+
+    def imitated(self) -> tuple[float, float]:
+        """Return what soft tissue lags, unless other people of the session show the delay."""
+        return (0.0, 0.0) if self._session.information[-1, -1] > 0.0 else SOFT_TISSUE_LAG_S
 
     def corrected_loads(
         self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, plate_index: np.ndarray

@@ -18,7 +18,6 @@ from typing import Self
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.instruments.priors import SOFT_TISSUE_LAG_S
 from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, GaussianPrior
 from kinertia.estimation.simultaneous.search.gauss_newton import GaussNewton
 from kinertia.estimation.simultaneous.search.problem import Linearised, MapProblem, Point, Slope
@@ -178,10 +177,10 @@ class CostProfile:
         curve, slope, _ = np.polyfit(delays, costs, 2)
         if not curve > 0.0:
             return unchanged
-        lag, lag_sd = SOFT_TISSUE_LAG_S
-        certain = 1.0 / (0.5 / curve + lag_sd**2)
+        none, none_sd = problem.imitated()
+        certain = 1.0 / (0.5 / curve + none_sd**2)
         shown = np.full((len(places), len(places)), certain)
-        rhs = np.full(len(places), certain * (values.sum() - 0.5 * slope / curve - lag))
+        rhs = np.full(len(places), certain * (values.sum() - 0.5 * slope / curve - none))
         gaussian = GaussianPrior.given(ErrorPriors(tuple(priors)), shown, rhs)
         found = np.linalg.solve(shown + gaussian.precision, rhs + gaussian.pull)
         linear = (known - instruments.precision[np.ix_(places, places)]).mean()
