@@ -349,8 +349,8 @@ def test_fits_of_one_person_show_plates_no_better_than_one():
 
 def test_a_fit_that_shows_little_takes_nothing_from_another_of_the_same_person():
     strong, weak = (
-        InstrumentInformation(("plate 1",), np.diag([each] * 8 + [1e6]), np.append(np.full(8, each * 0.01), 1e4))
-        for each in (1e5, 1e2)
+        InstrumentInformation(("plate 1",), np.diag([certain] * 8 + [1e6]), np.append(np.full(8, certain * 0.01), 1e4))
+        for certain in (1e5, 1e2)
     )
     both = InstrumentInformation.of_one_person([strong, weak])
     np.testing.assert_allclose(np.diag(both.information)[:8], 1e5, rtol=0.2)
