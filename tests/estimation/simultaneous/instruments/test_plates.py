@@ -23,6 +23,7 @@ from kinertia.estimation.simultaneous.instruments.plates import (
     impact_factors,
     turned_loads,
 )
+from kinertia.estimation.simultaneous.instruments.priors import SOFT_TISSUE_LAG_S
 from kinertia.settings import Subject
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.estimate import estimate
@@ -151,8 +152,9 @@ def clock_ms(recording_of, person, *moved_ms):
 
 @pytest.mark.slow
 def test_the_clock_follows_forces_that_are_moved(recording_of):
+    """Less what soft tissue is expected to lag."""
     late = clock_ms(recording_of, "synthetic/", -20.0, -8.0, 0.0, 8.0, 15.0)
-    np.testing.assert_allclose(list(late.values()), list(late), atol=0.8)
+    np.testing.assert_allclose(list(late.values()), np.array(list(late)) - 1e3 * SOFT_TISSUE_LAG_S[0], atol=0.8)
 
 
 @pytest.mark.slow
