@@ -109,7 +109,7 @@ def prepared(
 def _with_feet(
     uncertainty: ModelUncertainty, contexts: Sequence[RecordingContext], solved: Sequence[Kinematics]
 ) -> ModelUncertainty:
-    """Return the uncertainty with what steps of these trials tell of the plates' positions."""
+    """Return the uncertainty, including the information from the steps of these trials on plate positions."""
     plates = tuple(dict.fromkeys(plate for k in solved for plate in k.trial.loads.plates))
     names = {k.trial.name for k in solved}
     feet = positions_by_feet([context for context in contexts if context.name in names], plates)

@@ -20,6 +20,7 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.ambiguous_loads import FOOT_ENDS
 from kinertia.diagnostics.evidence.landmarks import body_centre
 from kinertia.diagnostics.evidence.plate_contacts import END_SHARE, PlateContact
+from kinertia.diagnostics.subject.movements import task_of
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentInformation
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Limit, Quantity
@@ -37,8 +38,6 @@ the heel marker. The mean of both differs from it by -16 to 30 mm (mean 4, SD 10
 _MEAN_ALONG_M, _PERSON_SD_M, _FOOT_SD_M, _STEP_SD_M = 0.004, 0.009, 0.008, 0.005
 """In walks of 18 people in 11 laboratories: the mean, and SDs between people, between the feet of a person (7 mm, of
 few), and between the steps of a foot."""
-_LONGEST_RUNNING_S = 0.4
-"""A step of a walk is longer; where runners land differs more between people."""
 _FEET_APART_M = 0.04
 """In these people one foot's steps act up to 23 mm farther forward than the other's."""
 _SIDEWAYS_SD_M, _OUTWARD_SD_M, _BOTH_BESIDE_M = 0.004, 0.05, 0.01
@@ -117,41 +116,42 @@ def ahead_of_usual_m(step: PlateContact, height_m: float) -> FloatArray:
 def positions_by_feet(contexts: Sequence[RecordingContext], plates: Sequence[str]) -> tuple[InstrumentInformation, ...]:
     """Return what steps show of the positions of plates, by where they act on the feet: along them and across.
 
-    Steps of runs do not count, nor those outside the window that the user states or with other people's loads.
+    Runs do not count, since where runners land differs more, nor do steps outside the stated window or with other
+    people's loads.
 
     Args:
         contexts: of all recordings of one person whose forces are used.
         plates: their names.
     """
     rows = [
-        (context.plates.names[step.plate], step, context.height_m)
+        (context.plates.names[step.plate], step)
         for context in contexts
-        if context.plates is not None and shows_feet_equally(context)
+        if context.plates is not None and shows_feet_equally(context) and task_of(context) != "run"
         for step in steps_alone(context, heel_steps(context))
-        if step.end_s - step.start_s > _LONGEST_RUNNING_S
-        and context.uses((step.start_s, step.end_s))
-        and step not in context.foreign_contacts
+        if context.uses((step.start_s, step.end_s)) and step not in context.foreign_contacts
     ]
     if not rows:
         return ()
-    on, steps, heights_m = zip(*rows, strict=True)
+    on, steps = zip(*rows, strict=True)
     forward = np.array([step.trajectory.heading(step.time, step.weight) for step in steps])
     left = np.column_stack([forward[:, 1], -forward[:, 0]])
     same_foot = np.equal.outer(*2 * [[step.foot for step in steps]])
-    found = ((forward, _ahead_of_others(steps, heights_m, same_foot)), (left, _beside_feet(steps, left, same_foot)))
+    found = (
+        (forward, _ahead_of_others(steps, contexts[0].height_m, same_foot)),
+        (left, _beside_feet(steps, left, same_foot)),
+    )
     return tuple(InstrumentInformation.of_positions(plates, on, way, *told) for way, told in found if told is not None)
 
 
 def _ahead_of_others(
-    steps: Sequence[PlateContact], heights_m: Sequence[float | None], same_foot: BoolArray
+    steps: Sequence[PlateContact], height_m: float | None, same_foot: BoolArray
 ) -> tuple[FloatArray, FloatArray] | None:
     """Return how much farther forward (m,) m than in other people m steps act, and the covariance of that without
     displaced plates; None without the stature, where feet differ, and where the mean of all steps is beyond P243's
     limits."""
-    known_m = [height_m for height_m in heights_m if height_m is not None]
-    if len(known_m) < len(steps):
+    if height_m is None:
         return None
-    ahead = np.array([ahead_of_usual_m(step, height_m).mean() for step, height_m in zip(steps, known_m, strict=True)])
+    ahead = np.array([ahead_of_usual_m(step, height_m).mean() for step in steps])
     of_feet = [float(ahead[same].mean()) for same in same_foot]
     if not BACK_M < float(ahead.mean()) < FORWARD_M or np.ptp(of_feet) > _FEET_APART_M:
         return None

@@ -1,17 +1,17 @@
 """Tests what changed between two sessions of one person: joint moments and angles, event by event.
 
-Markers are put on anew, so each session has its own markers, joint centres, axes and instruments; they share the body.
+Markers are re-applied, so each session has its own markers, joint centres, axes and instruments; they share the body.
 Both means are computed with the same body, the mean of the two estimates, and
 
     V = V_A + V_B + var[f_B(b) - f_A(b)]
 
 takes the place of V in `condition_changes`: V_A and V_B are over draws of everything but the body, b draws of the body,
-at each session's mass. (V_A and V_B cannot be found by subtracting the body's variance from that of everything: for
-lumbar moments both are nearly equal, so that their difference is uncertain, and body and posture compensate for each
-other in one estimate.)
+at each session's mass. (Subtracting the body's variance from the total does not give V_A and V_B: for lumbar moments the
+two are nearly equal, so that their difference is uncertain, and within an estimate body and posture compensate for each
+other.)
 
-When markers are put on anew, the ankle's centre moves in shank and foot alike. In the estimate, errors of the markers
-of shank and foot are independent, which allows the centre about 4 mm. The middle of two malleoli whose markers are off
+Re-applied markers move the ankle's centre equally in shank and foot. In the estimate, errors of the markers of shank
+and foot are independent, which allows the centre about 4 mm. The middle of two malleoli whose markers are off
 by 5 mm each, and by 5 mm together, is off by 6 mm. Draws therefore displace it to the side by another 5 mm
 (`with_drawn_ankles`), as they do the knee's.
 

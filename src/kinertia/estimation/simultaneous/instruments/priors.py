@@ -49,16 +49,16 @@ degrees, walks and runs of eleven laboratories show 0.2 to 0.5 degrees where the
 1.6 and 3.6 degrees in two, and in the others less than their SDs, of 1 to 2 degrees. A frame laid on the floor by eye
 is a few degrees askew."""
 DELAY_PRIOR_S = FaultMixture(0.0003, 0.005, 0.2, faulty_mean=0.006)
-"""Delay of the forces. Synchronous: half a sample of the plates. Delayed: with a prior that says nothing (SD 20 ms), 80
-recordings of 26 laboratories have apparent delays of 4.3 ms with an SD of 4.4 between laboratories, 8.2 where
-amplifiers are analogue and 2.3 elsewhere: rather late than early. Delays are assumed rarer than among these: of 20
+"""Delay of the forces. Where they are synchronous, half a sample of the plates. Otherwise, by 80 recordings of 26
+laboratories fitted with a flat prior (SD 20 ms): apparent delays are 4.3 ms with an SD of 4.4 between laboratories, 8.2
+where amplifiers are analogue and 2.3 elsewhere, so more often delayed than early. Delays are assumed rarer than among these: of 20
 people with synchronous forces, a prior that expects 3 ms in half of all laboratories makes ankle moments err by a fifth
 more. Forces that are 10 ms early are found as well as with a mean of zero."""
 SOFT_TISSUE_LAG_S = 0.0003, 0.001
 """Mean and SD of what seems to be a delay and is none: soft tissue lags behind. It is 1.1 ms where skin moves as it was
 measured on one person, 0 where it moves with the joints' angles, and in walks of 23 laboratories delays are 1.7 +- 0.9
 ms shorter below 4 Hz. Taken for a delay, it makes ankle moments of the first err by a seventh more, with forces on time
-or 10 ms late. With a mean of 0.5 ms, those of the second would err by 8 % more where forces are late."""
+or 10 ms late. With a mean of 0.5 ms, ankle moments of the second, with delayed forces, would err by 8 % more."""
 TRIAL_DELAY_PRIOR_S = FaultMixture(0.00003, 0.010, 0.04)
 """Delay of one trial, besides the synchronisation delay: cameras and plates that start together do so in every trial;
 of two runs on one treadmill, forces of the first are delayed by 8.4 ms and of the second by 13.5. A stated

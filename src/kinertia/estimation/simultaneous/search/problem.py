@@ -212,8 +212,8 @@ class MapProblem:
         return result
 
     def prior_information(self, static: np.ndarray) -> np.ndarray:
-        """Return the information (S, S) of all priors but those of errors, with that of the session's other people and
-        of the person's steps."""
+        """Return the information (S, S) of the priors, except those of errors, and of the terms: what other people of
+        the session and the person's steps show."""
         result = np.diag(self.layout.weight)
         for term in self.terms:
             term.add_information(result, static)
@@ -238,7 +238,7 @@ class MapProblem:
         return [at for term in self.terms for at in term.profiled()]
 
     def imitated(self) -> tuple[float, float]:
-        """Return mean and SD of what the data take for that sum, and is none."""
+        """Return mean and SD of the part of that sum that is apparent only: the data show it, but it is no error."""
         means, deviations = zip(*(term.imitated() for term in self.terms), strict=True)
         return sum(means), float(np.hypot.reduce(deviations))
 

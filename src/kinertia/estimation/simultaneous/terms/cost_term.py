@@ -109,7 +109,8 @@ class CostTerm:
         return []
 
     def imitated(self) -> tuple[float, float]:
-        """Return mean and SD of what the data take for the sum of the profiled errors, and is none."""
+        """Return mean and SD of the part of the profiled sum that is apparent only: the data show it, but it is no
+        error."""
         return 0.0, 0.0
 
     def read(self, solution: Solution) -> dict[str, Any]:

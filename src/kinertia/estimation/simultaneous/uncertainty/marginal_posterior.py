@@ -177,10 +177,10 @@ class CostProfile:
         curve, slope, _ = np.polyfit(delays, costs, 2)
         if not curve > 0.0:
             return unchanged
-        none, none_sd = problem.imitated()
-        certain = 1.0 / (0.5 / curve + none_sd**2)
+        imitated, imitated_sd = problem.imitated()
+        certain = 1.0 / (0.5 / curve + imitated_sd**2)
         shown = np.full((len(places), len(places)), certain)
-        rhs = np.full(len(places), certain * (values.sum() - 0.5 * slope / curve - none))
+        rhs = np.full(len(places), certain * (values.sum() - 0.5 * slope / curve - imitated))
         gaussian = GaussianPrior.given(ErrorPriors(tuple(priors)), shown, rhs)
         found = np.linalg.solve(shown + gaussian.precision, rhs + gaussian.pull)
         linear = (known - instruments.precision[np.ix_(places, places)]).mean()
