@@ -1,7 +1,8 @@
 """Measures what errors of a day's angles and moments come from, on synthetic people: one source put in at a time.
 
-The error due to a source is the error of a day with that source alone, minus that of a day without any. Moments are of the true
-body, as those of two days are of one body; what the estimate's own body makes up for does not cancel between days.
+The error due to a source is the error of a day with that source alone, minus that of a day without any. Moments are of
+the true body, as those of two days are of one body; what the estimate's own body makes up for does not cancel between
+days.
 """
 
 from collections import defaultdict

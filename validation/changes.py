@@ -292,8 +292,9 @@ pairs of days).
 
 What errors of a day come from, in {caused} people with other errors: RMS, N m/kg or degrees. *Stated*: the deviation
 of the difference over the square root of 2, of all people. *Shared* and *own*: placement of all markers of a segment
-together, and of each marker. The error due to a source is the error of a day with that source alone, minus that of
-a day without any (last column). Moments are of the true body: what the estimated body makes up for does not cancel between days.
+together, and of each marker. The error due to a source is the error of a day with that source alone, minus that of a
+day without any (last column). Moments are of the true body: what the estimated body makes up for does not cancel
+between days.
 
 {causes}
 

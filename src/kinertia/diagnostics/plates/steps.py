@@ -136,11 +136,12 @@ def positions_by_feet(contexts: Sequence[RecordingContext], plates: Sequence[str
     forward = np.array([step.trajectory.heading(step.time, step.weight) for step in steps])
     left = np.column_stack([forward[:, 1], -forward[:, 0]])
     same_foot = np.equal.outer(*2 * [[step.foot for step in steps]])
-    found = (
-        (forward, _ahead_of_others(steps, contexts[0].height_m, same_foot)),
-        (left, _beside_feet(steps, left, same_foot)),
+    along, across = _ahead_of_others(steps, contexts[0].height_m, same_foot), _beside_feet(steps, left, same_foot)
+    return tuple(
+        InstrumentInformation.of_positions(plates, on, way, *shown)
+        for way, shown in ((forward, along), (left, across))
+        if shown is not None
     )
-    return tuple(InstrumentInformation.of_positions(plates, on, way, *told) for way, told in found if told is not None)
 
 
 def _ahead_of_others(

@@ -6,9 +6,9 @@ Both means are computed with the same body, the mean of the two estimates, and
     V = V_A + V_B + var[f_B(b) - f_A(b)]
 
 takes the place of V in `condition_changes`: V_A and V_B are over draws of everything but the body, b draws of the body,
-at each session's mass. (Subtracting the body's variance from the total does not give V_A and V_B: for lumbar moments the
-two are nearly equal, so that their difference is uncertain, and within an estimate body and posture compensate for each
-other.)
+at each session's mass. (Subtracting the body's variance from the total does not give V_A and V_B: for lumbar moments
+the two are nearly equal, so that their difference is uncertain, and within an estimate body and posture compensate for
+each other.)
 
 Re-applied markers move the ankle's centre equally in shank and foot. In the estimate, errors of the markers of shank
 and foot are independent, which allows the centre about 4 mm. The middle of two malleoli whose markers are off

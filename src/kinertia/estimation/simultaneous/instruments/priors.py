@@ -51,9 +51,9 @@ is a few degrees askew."""
 DELAY_PRIOR_S = FaultMixture(0.0003, 0.005, 0.2, faulty_mean=0.006)
 """Delay of the forces. Where they are synchronous, half a sample of the plates. Otherwise, by 80 recordings of 26
 laboratories fitted with a flat prior (SD 20 ms): apparent delays are 4.3 ms with an SD of 4.4 between laboratories, 8.2
-where amplifiers are analogue and 2.3 elsewhere, so more often delayed than early. Delays are assumed rarer than among these: of 20
-people with synchronous forces, a prior that expects 3 ms in half of all laboratories makes ankle moments err by a fifth
-more. Forces that are 10 ms early are found as well as with a mean of zero."""
+where amplifiers are analogue and 2.3 elsewhere, so more often delayed than early. Delays are assumed rarer than among
+these: of 20 people with synchronous forces, a prior that expects 3 ms in half of all laboratories makes ankle moments
+err by a fifth more. Forces that are 10 ms early are found as well as with a mean of zero."""
 SOFT_TISSUE_LAG_S = 0.0003, 0.001
 """Mean and SD of what seems to be a delay and is none: soft tissue lags behind. It is 1.1 ms where skin moves as it was
 measured on one person, 0 where it moves with the joints' angles, and in walks of 23 laboratories delays are 1.7 +- 0.9
